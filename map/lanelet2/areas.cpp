@@ -1,4 +1,4 @@
-// The drivable surface beside lanes, and the edges of all of it: areas, the outline, and barriers between lanes.
+// Drivable areas beside lanes, and road edges: the outline of the whole drivable surface, and barriers between lanes.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -22,14 +22,14 @@ double area_of(const Points& a, std::size_t i, std::size_t j, std::size_t k) {
   return u.x() * v.y() - u.y() * v.x();
 }
 
-/// Twice the area; positive for rings that run counter-clockwise.
+/// Returns twice the area of a ring; positive if the ring runs counter-clockwise.
 double signed_area(const Points& ring) {
   double sum = 0;
   for (std::size_t i = 1; i + 1 < ring.size(); ++i) sum += area_of(ring, 0, i, i + 1);
   return sum;
 }
 
-/// Whether two sides that share no corner cross or touch.
+/// Whether two sides of a ring that share no corner cross or touch.
 bool crosses_itself(const Points& ring, SampleBudget* budget) {
   const std::size_t n = ring.size();
   for (std::size_t i = 0; i < n; ++i) {
@@ -46,7 +46,7 @@ bool crosses_itself(const Points& ring, SampleBudget* budget) {
   return false;
 }
 
-/// The triangles of a ring by ear clipping, as indices; nothing if it crosses itself.
+/// Splits a ring into triangles of its points' indices, by ear clipping; returns nullopt if the ring crosses itself.
 std::optional<std::vector<std::array<std::size_t, 3>>> triangulate(const Points& ring, SampleBudget* budget) {
   if (crosses_itself(ring, budget)) return std::nullopt;
   std::vector<std::size_t> left(ring.size());
@@ -66,7 +66,7 @@ std::optional<std::vector<std::array<std::size_t, 3>>> triangulate(const Points&
     std::size_t ear = 0;
     while (ear < left.size() && !is_ear(ear)) ++ear;
     if (ear == left.size()) {
-      // Points on a straight line are no corners.
+      // Points on a straight line are not corners, and are removed.
       ear = 0;
       const auto corner = [&](std::size_t at) {
         return std::abs(
@@ -95,7 +95,7 @@ class AreaBuilder {
       for (const Points& ring : rings_of(relation, "outer")) add_surface(ring, relation);
       for (Points ring : rings_of(relation, "inner")) add_hole(&ring);
     }
-    // Autoware's, which are closed without a repeated point.
+    // Autoware's parking lots, which are closed without a repeated point.
     for (const Way& way : file_.ways) {
       if (way.tags.of("type") != "parking_lot" || way.nodes.size() < 3) continue;
       add_surface(without_repeated(build_.points_of(static_cast<int32_t>(&way - file_.ways.data()))), way);
@@ -117,7 +117,7 @@ class AreaBuilder {
     return ring;
   }
 
-  /// The ways of a role, joined at shared points.
+  /// Returns the rings of the ways with a role, which are joined at shared points.
   std::vector<Points> rings_of(const Relation& relation, std::string_view role) {
     std::vector<int32_t> ways = relation.ways(role);
     std::erase_if(ways, [&](int32_t way) { return file_.ways[way].nodes.size() < 2; });
@@ -159,13 +159,13 @@ class AreaBuilder {
     const auto triangles = ring.size() < 3 ? std::nullopt : triangulate(ring, &build_.budget);
     if (!triangles) return record_fault(item);
     for (const auto& [a, b, c] : *triangles) {
-      // As a quad with a corner in the middle of a side.
+      // A triangle is stored as a quad with a corner in the middle of a side.
       build_.bands.push_back({{ring[a], ring[c]}, {0.5 * (ring[a] + ring[b]), ring[b]}});
       build_.band_roads.push_back(-1);
     }
   }
 
-  /// The surface is around it, so on the right of a ring that runs counter-clockwise.
+  /// The surface is around a hole, and thus on the right of a ring that runs counter-clockwise.
   void add_hole(Points* ring) {
     if (signed_area(*ring) < 0) std::reverse(ring->begin(), ring->end());
     ring->push_back(ring->front());
@@ -180,7 +180,7 @@ class AreaBuilder {
   const OsmFile& file_;
 };
 
-/// Lines that no vehicle crosses. Low curbs are driven over.
+/// Whether a line is a barrier that no vehicle crosses. Low curbs are not, since vehicles drive over them.
 bool is_barrier(const Tags& tags) {
   const std::string_view type = tags.of("type");
   if (type == "curbstone") return tags.of("subtype") != "low";
@@ -214,7 +214,7 @@ void build_edges(Build* build) {
     remove_edges_across_openings(open, &map);
   }
   // A barrier with lanes on both sides is an edge for both.
-  std::map<int32_t, int> sides;  // by way: 1 for a lane on its right, 2 for one on its left
+  std::map<int32_t, int> sides;  // by way: 1 if a lane is on its right, 2 if on its left, 3 if on both sides
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     if (!is_drivable(map.lanes[i].type)) continue;
     const auto& [left, right] = build->lane_sides[i];

@@ -1,5 +1,5 @@
-// The stages that turn an OsmFile into a RoadMap, in the order in which parse_lanelet2() runs them. Each fills its own
-// vectors of the map and may read those of earlier stages.
+// Stages that turn an OsmFile into a RoadMap, in the order in which parse_lanelet2() runs them. Each stage fills its
+// own vectors of the map and may read vectors of earlier stages.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ namespace pictura::lanelet2 {
 
 using Points = std::vector<Eigen::Vector3d>;
 
-/// A way in the direction of a lane's traffic.
+/// A way that borders a lane, in the direction of the lane's traffic.
 struct Border {
   int32_t way = -1;
   bool is_reversed = false;
@@ -25,12 +25,12 @@ struct Border {
   Border reversed() const { return {way, !is_reversed}; }
 };
 
-/// What a relation of type lanelet became.
+/// A relation of type lanelet: its borders and its lanes in the map.
 struct Lanelet {
   int32_t relation = -1;
   int32_t road = -1;             // in RoadMap::road_names; -1 for crosswalks
-  Border left, right;            // in its own direction
-  int32_t lane = -1, back = -1;  // lanes of the map: its own, and of two-way ones that of the opposite traffic
+  Border left, right;            // in the lanelet's direction
+  int32_t lane = -1, back = -1;  // lanes of the map; back: lane of the opposite traffic, if the lanelet is two-way
 };
 
 /// State shared by the stages.
@@ -43,19 +43,19 @@ struct Build {
   std::vector<Lanelet> lanelets{};
   std::vector<int32_t> lanelet_of_relation{};           // [relations] index into lanelets, or -1
   std::vector<std::pair<Border, Border>> lane_sides{};  // [map.lanes] left and right
-  std::vector<SurfaceBand> bands{};                     // the drivable surface: lanes, then areas
+  std::vector<SurfaceBand> bands{};                     // drivable surface: lanes, then areas
   std::vector<int32_t> band_roads{};                    // [bands] index into road_names, or -1
 
   /// Converts file coordinates to map coordinates.
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const {
     return p - Eigen::Vector3d{map->origin_m[0], map->origin_m[1], map->origin_m[2]};
   }
-  /// Counts work on so many items, so that no file can take minutes.
+  /// Counts work on this number of items against the budget, so that no file can take minutes.
   void count_work(std::size_t items) {
     constexpr std::size_t kItemsPerSample = 8;
     for (std::size_t i = 0; i < items; i += kItemsPerSample) budget.count_sample();
   }
-  /// The points of a border about the origin.
+  /// Returns the points of a border, relative to the origin.
   Points points_of(const Border& border);
   Points points_of(int32_t way) { return points_of(Border{way, false}); }
 
@@ -66,36 +66,37 @@ struct Build {
   int32_t last_node(const Border& border) const { return first_node(border.reversed()); }
   const Relation& relation_of(const Lanelet& lanelet) const { return file.relations[lanelet.relation]; }
   SourceElement source_of(int32_t road, std::ptrdiff_t offset) const { return {road, file.source.line_at(offset)}; }
-  /// The lane of a relation that is a lanelet; -1 for all others, and for crosswalks.
+  /// Returns the lane of a relation that is a lanelet; -1 for other relations and for crosswalks.
   int32_t lane_of(int32_t relation) const {
     const int32_t lanelet = lanelet_of_relation[relation];
     return lanelet < 0 ? -1 : lanelets[lanelet].lane;
   }
 };
 
-/// The point at a fraction of a line's length in plan.
+/// Returns the point at a fraction of a line's length in plan.
 Eigen::Vector3d point_at_fraction(const Points& line, double fraction);
 
-/// The points (about the origin) without repeated ones and with pieces of at most kMaxPiece_m. Fewer than two if the
-/// line has no length.
+/// Returns a line (relative to the origin) without repeated points, cut into pieces of at most kMaxPiece_m. The result
+/// has fewer than two points if the line has no length.
 std::vector<CurvePoint> cut_line(const std::vector<CurvePoint>& line, SampleBudget* budget);
 std::vector<CurvePoint> cut_line(const Points& line, SampleBudget* budget);
 
-/// Whether vehicles drive there: by the tags participant:*, else by the subtype. For lanelets and areas.
+/// Whether vehicles may drive on a lanelet or area with these tags: by the tags participant:* if there are any, else by
+/// the subtype.
 bool is_for_vehicles(const Tags& tags);
 
-/// Chooses lanelets with two borders, aligns these, and sets the map's origin: the centre of their points, in whole
-/// metres. Leaves out nodes' far from there. Throws Error if there is no lanelet.
+/// Selects lanelets with two borders, aligns the borders, and sets the map's origin to the centre of their points, in
+/// whole metres. Throws Error if there is no lanelet, or naming a way's node that is too far from the origin.
 void find_lanelets(Build* build);
-/// Lanes, links, neighbours, junctions, speed limits; crosswalks.
+/// Builds lanes with links, neighbours, junctions and speed limits, and crosswalks.
 void build_lanes(Build* build);
 /// Adds the surface of drivable areas to the bands.
 void build_areas(Build* build);
-/// The outline of the bands, and barriers between lanes.
+/// Builds road edges: the outline of the bands, and barriers between lanes.
 void build_edges(Build* build);
-/// Markings, stop lines and parking spaces.
+/// Builds markings, stop lines and parking spaces.
 void build_paint(Build* build);
-/// Traffic lights and signs.
+/// Builds traffic lights and signs.
 void build_rules(Build* build);
 void count_facts(Build* build);
 

@@ -1,4 +1,5 @@
-// Lanes of a Lanelet2 map: from pairs of borders to centre lines, links, neighbours, junctions and speed limits.
+// Construction of lanes from the pairs of borders of a Lanelet2 map: centre lines, links, neighbours, junctions and
+// speed limits.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -17,9 +18,9 @@ namespace {
 constexpr double kSameOutlinePoint_m = 0.01;
 constexpr double kMaxWidth_m = 500.0;
 constexpr double kMaxRadius_m = 50e3;  // maximum distance of a map's points from its origin, along each axis
-constexpr float kBridged_m = 20.0f;    // maximum length of a lanelet between two of a junction
+constexpr float kBridged_m = 20.0f;    // maximum length of a lanelet between two lanelets of a junction
 
-/// Positive where `p` is on the left of the line. At corners the side is that of the sum of both normals.
+/// Returns a positive number if `p` is on the left of the line. At a corner, the sum of both sides' normals decides.
 double side_of(const Points& line, const Eigen::Vector3d& p) {
   double best_m = std::numeric_limits<double>::infinity(), side = 0;
   const auto normal_of = [&](std::size_t i) {
@@ -46,7 +47,7 @@ Eigen::Vector3d middle_of(const Points& line) {
   return line.size() > 2 ? line[line.size() / 2] : (0.5 * (line.front() + line.back())).eval();
 }
 
-/// The lengths in plan up to each point, as fractions of the whole.
+/// Returns the length in plan from the start to each point, as a fraction of the whole length.
 std::vector<double> fractions_of(const Points& line) {
   std::vector<double> fractions{0};
   for (std::size_t i = 1; i < line.size(); ++i) {
@@ -57,7 +58,7 @@ std::vector<double> fractions_of(const Points& line) {
   return fractions;
 }
 
-/// Points at ascending fractions of a line.
+/// Returns the points at ascending fractions of a line. `own`: fractions of the line's own points.
 Points points_at(const Points& line, const std::vector<double>& own, const std::vector<double>& fractions) {
   Points points;
   std::size_t next = 1;
@@ -77,7 +78,7 @@ struct Kind {
   LaneType type = LaneType::driving;
 };
 
-/// Nothing for unknown subtypes.
+/// Returns the lane type of a subtype; nullopt for unknown subtypes.
 std::optional<LaneType> type_of_subtype(std::string_view subtype) {
   static const std::map<std::string_view, LaneType> types{
       {"", LaneType::driving},
@@ -110,7 +111,7 @@ bool is_allowed(const Tags& tags, std::string_view participant) {
   });
 }
 
-/// The lane type that the tags participant:* state; nothing without them.
+/// Returns the lane type that the tags participant:* state; nullopt without such tags.
 std::optional<LaneType> type_of_participants(const Tags& tags) {
   if (std::none_of(tags.begin(), tags.end(), [](const auto& tag) { return tag.first.starts_with("participant:"); })) {
     return std::nullopt;
@@ -123,8 +124,8 @@ std::optional<LaneType> type_of_participants(const Tags& tags) {
   return is_allowed(tags, "pedestrian") ? LaneType::sidewalk : LaneType::restricted;
 }
 
-/// Limits where the file has none: those of Germany, on which Lanelet2's own rules are modelled, as Lanelet2's default
-/// for a location that is missing is urban.
+/// Returns the speed limit for a lane without one in the file. Limits are those of Germany, on which Lanelet2's own
+/// rules are modelled. A missing location counts as urban, as in Lanelet2.
 double default_speed_mps(const Tags& tags) {
   const std::string_view subtype = tags.of("subtype"), location = tags.of("location");
   const bool is_nonurban = location == "nonurban";
@@ -137,7 +138,7 @@ double default_speed_mps(const Tags& tags) {
   return double{kDefaultSpeedLimit_mps};
 }
 
-/// The speed of German signs: 274-50 limits to 50 km/h, 274_1 is the zone of 30, 310 the beginning of a town.
+/// Returns the speed limit of a German sign: 274-50 limits to 50 km/h, 274_1 begins a 30 km/h zone, 310 begins a town.
 std::optional<double> speed_of_sign_mps(std::string_view sign) {
   if (sign == "de310") return 50 / 3.6;
   if (!sign.starts_with("de274")) return parse_speed_mps(sign);
@@ -216,7 +217,7 @@ class LaneBuilder {
     build_.band_roads.push_back(lanelet->road);
   }
 
-  /// The distance of the borders perpendicular to the center line.
+  /// Sets widths: the distance between the borders, perpendicular to the centre line.
   static void set_widths(const SurfaceBand& band, std::vector<CurvePoint>* line) {
     std::vector<CurvePoint>& points = *line;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -249,7 +250,7 @@ class LaneBuilder {
   int32_t add_lane(const Lanelet& lanelet, LaneType type, const std::vector<CurvePoint>& points, bool is_back) {
     const Relation& relation = build_.relation_of(lanelet);
     Lane lane{.type = type};
-    lane.in_junction = type == LaneType::driving && relation.tags.has("turn_direction");  // Autoware's
+    lane.in_junction = type == LaneType::driving && relation.tags.has("turn_direction");  // tag of Autoware
     lane.speed_limit_mps = static_cast<float>(speed_limit_mps(relation));
     lane.source_road = lanelet.road;
     lane.source_lane = is_back ? -1 : 1;
@@ -261,7 +262,7 @@ class LaneBuilder {
     return static_cast<int32_t>(map_.lanes.size()) - 1;
   }
 
-  /// Speed limit of a regulatory element, else of the lanelet's tags, else by its subtype and location.
+  /// Returns the speed limit of a regulatory element, else of the lanelet's tags, else of its subtype and location.
   double speed_limit_mps(const Relation& relation) const {
     for (const int32_t index : relation.relations("regulatory_element")) {
       const Relation& rule = file_.relations[index];
@@ -305,7 +306,7 @@ class LaneBuilder {
     map_.provenance.crosswalks.push_back(build_.source_of(-1, relation.offset));
   }
 
-  /// A lane follows another if its borders begin at the points where the other's end.
+  /// Links lanes. A lane follows another lane if its borders begin at the points at which the other lane's borders end.
   void link() {
     std::map<std::pair<int32_t, int32_t>, std::vector<int32_t>> starts;
     for (std::size_t i = 0; i < map_.lanes.size(); ++i) {
@@ -327,7 +328,7 @@ class LaneBuilder {
     set_lane_links(links, &map_);
   }
 
-  /// Whether traffic may cross the line, in one direction at least.
+  /// Whether traffic may cross the line in at least one direction.
   static bool allows_lane_change(const Tags& tags) {
     if (const std::optional<bool> stated = tags.flag("lane_change")) return *stated;
     const std::optional<bool> left = tags.flag("lane_change:left"), right = tags.flag("lane_change:right");
@@ -337,7 +338,7 @@ class LaneBuilder {
     return subtype == "dashed" || subtype == "dashed_solid" || subtype == "solid_dashed";
   }
 
-  /// Lanes of one direction that share a border that traffic may cross.
+  /// Sets neighbours: lanes of the same direction that share a border which traffic may cross.
   void set_neighbors() {
     std::map<Border, std::vector<int32_t>> lanes_left_of;
     const auto is_route = [&](int32_t lane) { return map_.lanes[lane].type == LaneType::driving; };
@@ -361,7 +362,8 @@ class LaneBuilder {
     }
   }
 
-  /// Whether `lane` is to the left of `other`, so that they must not become a ring.
+  /// Whether `lane` is `other` or one of its left neighbours. Such lanes must not be joined, since neighbours would
+  /// form a ring.
   bool is_leftmost_of(int32_t lane, int32_t other) {
     while (other >= 0 && other != lane) {
       other = map_.lanes[other].left_neighbor;
@@ -397,7 +399,7 @@ std::vector<CurvePoint> cut_line(const std::vector<CurvePoint>& line, SampleBudg
       const CurvePoint last = cut.back();
       const double way_m = plan_distance_m(last.position_m, next.position_m);
       if (way_m < kSameOutlinePoint_m) {
-        // The last point stays: others may begin there.
+        // The last point is kept exactly, since other lines may begin there.
         if (i + 1 == line.size() && cut.size() > 1) cut.back() = next;
         continue;
       }
@@ -442,7 +444,8 @@ void find_lanelets(Build* build) {
       continue;
     }
     Lanelet lanelet{.relation = static_cast<int32_t>(i), .left = {left[0]}, .right = {right[0]}};
-    // As Lanelet2 does: the middle of each border is on its side of the other one.
+    // As in Lanelet2, the left border is reversed unless the middle of the right border is on its right, and the right
+    // border is reversed unless the middle of the left border is on its left.
     if (side_of(build->points_of(lanelet.left), middle_of(build->points_of(lanelet.right))) >= 0) {
       lanelet.left.is_reversed = true;
     }

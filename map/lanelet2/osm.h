@@ -1,5 +1,5 @@
-// The contents of a Lanelet2 file: its points, lines and relations as OpenStreetMap's XML has them, with checked ids
-// and numbers and resolved references. Indices are into the vectors of the same OsmFile.
+// Contents of a Lanelet2 file: points, lines and relations as in OpenStreetMap's XML, with checked ids and numbers and
+// resolved references. Indices refer to the vectors of the same OsmFile.
 #pragma once
 
 #include <cstddef>
@@ -21,14 +21,15 @@
 
 namespace pictura::lanelet2 {
 
-/// What Lanelet2 reads as true and as false; nothing for everything else.
+/// Returns true for the texts that Lanelet2 reads as true, false for those that it reads as false, nullopt for all
+/// others.
 std::optional<bool> flag_of(std::string_view value);
 
-/// Keys and values, in the file's order. Refers to the document.
+/// Keys and values of an element, in the order of the file. Refers to the document, which must outlive it.
 class Tags {
  public:
   void add(std::string_view key, std::string_view value) { tags_.emplace_back(key, value); }
-  /// The value of the first tag with that key; empty where there is none.
+  /// Returns the value of the first tag with that key; empty if no tag has it.
   std::string_view of(std::string_view key) const;
   bool has(std::string_view key) const { return !of(key).empty(); }
   std::optional<bool> flag(std::string_view key) const { return flag_of(of(key)); }
@@ -56,7 +57,7 @@ struct Way {
   int64_t id = 0;
   std::ptrdiff_t offset = 0;
   Tags tags;
-  std::vector<int32_t> nodes;  // at least two, with positions
+  std::vector<int32_t> nodes;  // at least two nodes, all with positions
 };
 
 struct Relation {
@@ -65,11 +66,11 @@ struct Relation {
   Tags tags;
   struct Member {
     std::string_view role;
-    int32_t way = -1, relation = -1;  // one of them
+    int32_t way = -1, relation = -1;  // one of both; the other is -1
   };
   std::vector<Member> members;
 
-  /// The ways with that role, in the file's order.
+  /// Returns the ways with that role, in the order of the file.
   std::vector<int32_t> ways(std::string_view role) const;
   std::vector<int32_t> relations(std::string_view role) const;
 };
@@ -84,7 +85,7 @@ struct OsmFile {
 
   opendrive::SourceLocation where(const Node& node) const { return place("node", "node", node); }
   opendrive::SourceLocation where(const Way& way) const { return place("way", "way", way); }
-  /// Its owner is "lanelet 12" and the like.
+  /// Location whose owner is the relation's kind and id, such as "lanelet 12".
   opendrive::SourceLocation where(const Relation& relation) const;
 
  private:
@@ -94,18 +95,18 @@ struct OsmFile {
   }
 };
 
-/// Reads `text`; `name` names it in messages. Repairs the faults that docs/reference/lanelet2.md lists; throws
-/// Error naming file, line and element for all other faults.
+/// Reads `text`; `name` is the file's name in messages. Repairs the faults that docs/reference/lanelet2.md lists.
+/// Throws Error naming file, line and element for all other faults.
 void read_osm(std::string_view text, const std::string& name, opendrive::Faults* faults, OsmFile* file_out);
 
-/// Sets the positions of all nodes and the geographic reference, and leaves out nodes without a position: of `origin`
-/// the UTM coordinates minus the origin's; else local coordinates, if any node has them; else UTM in the zone of the
-/// first node. The plan, of a copy, is applied to the result.
+/// Sets the positions of all nodes and the geographic reference, and removes nodes without a position from ways. With
+/// `origin`, positions are UTM coordinates minus those of the origin; else local coordinates, if any node has them;
+/// else UTM coordinates in the zone of the first node. `plan`, the plan of a copy, is then applied to the positions.
 void place_nodes(const std::optional<GeoPoint>& origin, const PlanMap& plan, opendrive::Faults* faults,
                  OsmFile* file_inout);
 
-/// A speed in m/s from text like "50", "50 km/h", "25 mph" or "13.9 m/s"; km/h where there is no unit. Nothing for
-/// other text and for what is no speed limit.
+/// Parses a speed limit like "50", "50 km/h", "25 mph" or "13.9 m/s" and returns it in m/s; without a unit the number
+/// is in km/h. Returns nullopt for other texts, and for speeds that cannot be a limit.
 std::optional<double> parse_speed_mps(std::string_view text);
 
 }  // namespace pictura::lanelet2

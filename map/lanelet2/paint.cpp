@@ -1,4 +1,4 @@
-// Paint of a Lanelet2 map: lines with their dashes, stop lines, parking spaces.
+// Construction of paint from a Lanelet2 map: lines with their dashes, stop lines, parking spaces.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -41,7 +41,7 @@ class Painter {
     if (type == "line_thin") return add_line(index, kThinLine_m, way.tags.of("subtype"));
     if (type == "line_thick") return add_line(index, kThickLine_m, way.tags.of("subtype"));
     if (type == "bike_marking") return add_line(index, kThinLine_m, "dashed");
-    // The outline of a crosswalk is drawn.
+    // The borders of a crosswalk get no line here, since the crosswalk's outline is drawn.
     if (type == "pedestrian_marking" && !crosswalk_borders_.contains(index)) {
       return add_line(index, kThinLine_m, "solid");
     }
@@ -49,7 +49,7 @@ class Painter {
     if (type == "parking_space") add_parking_space(index);
   }
 
-  /// The tag width, in metres; 0 for what it is where there is none or no line has it.
+  /// Returns the tag `width` in metres; 0 if it is missing or out of [0.01, high_m].
   double width_of(const Way& way, double high_m) const {
     const std::optional<double> width_m = parse_written_number(way.tags.of("width"));
     return width_m && *width_m >= 0.01 && *width_m <= high_m ? *width_m : 0;
@@ -74,7 +74,7 @@ class Painter {
     const bool is_dashed = subtype.starts_with("dashed");
     const std::size_t second = subtype.find('_');
     if (second == std::string_view::npos) return add_stripe(stripe, line, is_dashed);
-    // The first word of a double line is the stripe on its left.
+    // The first word of a double line's subtype describes its left stripe.
     add_stripe(stripe, moved_left(line, stripe.width_m), is_dashed);
     add_stripe(stripe, moved_left(line, -stripe.width_m), subtype.substr(second + 1).starts_with("dashed"));
   }
@@ -94,14 +94,14 @@ class Painter {
       add_marking(stripe, part_of(line, begin * length_m, end * length_m), true);
     }
     if (!stated.empty()) return;
-    // Each dash is looked for along the whole line.
+    // Building each dash takes a pass over the whole line.
     for (double work = 0; work < length_m / kDashPeriod_m * static_cast<double>(line.size()); work += kWorkPerSample) {
       build_.budget.count_sample();
     }
     for (const std::vector<CurvePoint>& dash : dashes_of(line)) add_marking(stripe, dash, true);
   }
 
-  /// Where the points of a line say that its dashes begin and end, as fractions of its length.
+  /// Returns where dashes begin and end according to tags of the line's points, as fractions of the line's length.
   std::vector<std::pair<double, double>> stated_dashes(int32_t index) {
     const Way& way = file_.ways[index];
     const Points points = build_.points_of(index);
@@ -145,7 +145,7 @@ class Painter {
     map_.provenance.stop_lines.push_back(build_.source_of(-1, way.offset));
   }
 
-  /// Autoware's: a line along the space, with its width.
+  /// Adds Autoware's parking space: a line along the space, with the space's width as a tag.
   void add_parking_space(int32_t index) {
     const Way& way = file_.ways[index];
     const Points points = build_.points_of(index);

@@ -19,7 +19,7 @@ constexpr double kSemiMajorAxis_m = 6378137.0, kFlattening = 1 / 298.257223563; 
 
 double central_meridian_deg(const UtmZone& zone) { return 6.0 * zone.number - 183; }
 
-/// Without I and O; 24 letters from A.
+/// Returns the index of an MGRS letter among the 24 letters without I and O; -1 for other characters.
 int mgrs_letter(char c) {
   if (c < 'A' || c > 'Z' || c == 'I' || c == 'O') return -1;
   return c - 'A' - (c > 'I' ? 1 : 0) - (c > 'O' ? 1 : 0);
@@ -73,14 +73,15 @@ std::optional<MgrsPlace> parse_mgrs(std::string_view code) {
   const int band = mgrs_letter(code[at]), column = mgrs_letter(code[at + 1]), row = mgrs_letter(code[at + 2]);
   constexpr int kBandC = 2, kBandN = 12, kBandX = 21, kRows = 20;
   if (band < kBandC || band > kBandX || column < 0 || row < 0 || row >= kRows) return std::nullopt;
-  // Columns repeat every three zones, eight letters each; rows every 2000 km, and begin with F in even zones.
+  // Columns have eight letters per zone and repeat every three zones. Rows repeat every 2000 km; even zones begin with
+  // F.
   const int easting = column - 8 * ((number - 1) % 3);
   if (easting < 0 || easting >= 8) return std::nullopt;
   MgrsPlace place;
   place.zone = {number, band < kBandN};
   place.square_m.x_m = (easting + 1) * kSquare_m;
   const double in_cycle_m = ((row + (number % 2 == 0 ? kRows - 5 : 0)) % kRows) * kSquare_m;
-  // The square that reaches into the band: bands are 8 degrees high, the northernmost one 12.
+  // The repeated square that reaches into the band is used. Bands are 8 degrees high, the northernmost 12.
   const double south_deg = 8.0 * (band - kBandN), north_deg = south_deg + (band == kBandX ? 12 : 8);
   const double meridian_deg = central_meridian_deg(place.zone);
   const double low_m = to_utm({south_deg, meridian_deg}, place.zone).y_m - kSquare_m;

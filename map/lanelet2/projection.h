@@ -1,4 +1,4 @@
-// Projections of latitude and longitude to metres, as maps of Lanelet2 need them: UTM, and squares of MGRS.
+// Projections of latitude and longitude to metres that Lanelet2 maps use: UTM, and squares of MGRS.
 #pragma once
 
 #include <optional>
@@ -25,25 +25,26 @@ struct UtmZone {
   bool is_south = false;
 };
 
-/// The zone of a place, with the exceptions about Norway and Svalbard. Latitudes in [-80, 84].
+/// Returns the zone of a place, including the exceptions for Norway and Svalbard. The latitude must be in [-80, 84].
 UtmZone utm_zone_of(const GeoPoint& place);
 
-/// The place in a zone, which need not be its own: Krueger's series in the third flattening to the sixth order, whose
-/// error is below 1e-6 m within 3000 km of the central meridian (Karney, Transverse Mercator with an accuracy of a few
-/// nanometers, 2011).
+/// Returns the coordinates of a place in a zone, which may be another zone than the place's own. Computed by Krueger's
+/// series in the third flattening to the sixth order, whose error is below 1e-6 m within 3000 km of the central
+/// meridian (Karney, Transverse Mercator with an accuracy of a few nanometers, 2011).
 GridPoint to_utm(const GeoPoint& place, const UtmZone& zone);
 
-/// What an MGRS code like 54SVE8155012345 names.
+/// Place of an MGRS code, such as 54SVE8155012345.
 struct MgrsPlace {
   UtmZone zone;
-  GridPoint square_m;  // the south-west corner of its square of 100 km, in the zone
-  GridPoint offset_m;  // within the square, from the digits: as precise as they are many
+  GridPoint square_m;  // south-west corner of the place's square of 100 km, in the zone
+  GridPoint offset_m;  // offset within the square; the code's digits determine its resolution
 };
 
-/// Nothing unless the text is a code of a zone, a band, a square, and at most ten digits, which exists.
+/// Returns the place of a code of zone, band, square and at most ten digits. Returns nullopt if the text is no such
+/// code, or if the square does not exist.
 std::optional<MgrsPlace> parse_mgrs(std::string_view code);
 
-/// "+proj=utm ..." of coordinates that are UTM's minus `shift`.
+/// Returns the PROJ string of UTM coordinates minus `shift_m`.
 std::string proj_string_of(const UtmZone& zone, const GridPoint& shift_m);
 
 }  // namespace pictura

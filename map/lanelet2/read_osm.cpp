@@ -1,4 +1,4 @@
-// Reads OpenStreetMap's XML: nodes, ways and relations, in this order, whatever the file's.
+// Reader of OpenStreetMap's XML: nodes, then ways, then relations, in whichever order the file contains them.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,7 +17,7 @@ constexpr double kMaxLocal_m = 1e8;  // maximum magnitude of coordinates of any 
 
 bool is_deleted(pugi::xml_node element) { return std::string_view(element.attribute("action").value()) == "delete"; }
 
-/// The kind of a relation, as messages name it.
+/// Returns the kind of a relation for messages.
 std::string_view kind_of(const Tags& tags) {
   const std::string_view type = tags.of("type");
   if (type == "multipolygon") return "area";
@@ -39,7 +39,7 @@ class Reader {
     for (const pugi::xml_node element : root.children("way")) {
       if (!is_deleted(element)) read_way(element);
     }
-    // Relations refer to each other in any order.
+    // Relations may refer to later relations, so members are read after all relations.
     for (const pugi::xml_node element : root.children("relation")) {
       if (is_deleted(element)) continue;
       Relation relation{.id = id_of(element), .offset = element.offset_debug(), .tags = tags_of(element)};
@@ -76,7 +76,7 @@ class Reader {
     return tags;
   }
 
-  /// False if another element of the kind has the id.
+  /// Returns false if another element of the same kind has the id.
   template <typename Item>
   bool add_id(const Item& item, Index* index, std::size_t at) {
     if (index->emplace(item.id, static_cast<int32_t>(at)).second) return true;
@@ -84,7 +84,7 @@ class Reader {
     return false;
   }
 
-  /// Nothing for an empty text.
+  /// Parses a number; returns nullopt for an empty text.
   std::optional<double> number(pugi::xml_node element, std::string_view what, std::string_view text, double limit) {
     if (text.empty()) return std::nullopt;
     const std::optional<double> value = parse_written_number(text);
@@ -130,7 +130,7 @@ class Reader {
       const int64_t id = integer(reference, "ref");
       const std::string_view type = reference.attribute("type").value(), role = reference.attribute("role").value();
       const bool is_way = type == "way";
-      if (!is_way && type != "relation") continue;  // nodes have no role that is read
+      if (!is_way && type != "relation") continue;  // no member node has a role that is read
       const Index& index = is_way ? way_of_id_ : relation_of_id_;
       const auto found = index.find(id);
       if (found == index.end()) {
@@ -149,7 +149,7 @@ class Reader {
   Index node_of_id_, way_of_id_, relation_of_id_;
 };
 
-/// The coordinates of a file's nodes, chosen from what they have.
+/// Coordinates of a file's nodes, chosen by the kinds of coordinates that the nodes have.
 class Placement {
  public:
   Placement(const std::optional<GeoPoint>& origin, OsmFile* file) : file_(*file) {
@@ -157,7 +157,7 @@ class Placement {
     const auto with_geo = std::find_if(nodes.begin(), nodes.end(), [](const Node& n) { return n.geo.has_value(); });
     is_local_ = !origin && std::any_of(nodes.begin(), nodes.end(), [](const Node& n) { return n.local.has_value(); });
     if (is_local_) {
-      // Autoware's local coordinates are those within the square.
+      // Autoware's local coordinates are offsets within the MGRS square.
       for (const Node& node : nodes) {
         const std::optional<MgrsPlace> square = parse_mgrs(node.mgrs);
         if (!square) continue;
@@ -188,7 +188,7 @@ class Placement {
     if (is_local_) return node.local;
     if (!zone_) return std::nullopt;
     if (node.geo) {
-      // The series does not converge a quarter of the Earth away.
+      // Far from the central meridian the series does not converge.
       const double meridian_deg = 6.0 * zone_->number - 183;
       if (std::abs(std::remainder(node.geo->longitude_deg - meridian_deg, 360)) > 30) return std::nullopt;
       const GridPoint utm = to_utm(*node.geo, *zone_);
@@ -263,7 +263,7 @@ void place_nodes(const std::optional<GeoPoint>& origin, const PlanMap& plan, ope
     node.position_m.x() = plan.xx * place->x_m + plan.xy * place->y_m;
     node.position_m.y() = plan.yx * place->x_m + plan.yy * place->y_m;
   }
-  if (!(plan == PlanMap{})) file.geo_reference.clear();  // a copy lies nowhere on Earth
+  if (!(plan == PlanMap{})) file.geo_reference.clear();  // a deformed copy has no place on Earth
   std::vector<bool> is_recorded(file.nodes.size(), false);
   for (Way& way : file.ways) {
     std::erase_if(way.nodes, [&](int32_t index) {

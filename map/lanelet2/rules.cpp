@@ -1,4 +1,4 @@
-// Traffic lights and signs of a Lanelet2 map, from its regulatory elements; then the counts of the map.
+// Construction of traffic lights and signs from the regulatory elements of a Lanelet2 map, and the map's counts.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,13 +17,14 @@ namespace pictura::lanelet2 {
 
 namespace {
 
-// Heights of heads above the stop line where the file has none, as for OpenDRIVE, and from when on it has one.
+// Heights of near and far heads above the stop line, as for OpenDRIVE, if the file has none. The file has a height if
+// the head is at least kLowestHead_m above the line.
 constexpr float kNearHeadHeight_m = 3.5f, kFarHeadHeight_m = 5.5f, kLowestHead_m = 1.5f;
 constexpr float kFarHead_m = 5.0f;
 constexpr float kMinStopLine_m = 0.1f;
-constexpr float kJunctionAhead_m = 40.0f;  // maximum way from a light to its junction
+constexpr float kJunctionAhead_m = 40.0f;  // maximum distance along lanes from a light to its junction
 
-/// The place along a lane, from 0 to 1, that is nearest to a point.
+/// Returns the place along a lane that is nearest to a point, as a fraction from 0 to 1.
 float nearest_share(const RoadMap& map, int32_t lane, Vec3 p) {
   const Span<const LanePoint> points = map.points_of(map.lanes[lane]);
   float best_m = std::numeric_limits<float>::infinity(), s_m = 0;
@@ -71,16 +72,17 @@ class RuleBuilder {
   }
 
  private:
-  /// The heads, the lanes and the stop line of one or several regulatory elements.
+  /// Heads, lanes and stop line of one or several regulatory elements.
   struct Approach {
-    int32_t relation = -1;        // the first
+    int32_t relation = -1;        // first of these elements
     int32_t stop_line = -1;       // way, or -1
     std::vector<int32_t> heads;   // ways
-    std::vector<int32_t> tagged;  // lanes that refer to it
+    std::vector<int32_t> tagged;  // lanes that refer to one of these elements
     std::vector<int32_t> incoming, connecting;
   };
 
-  /// Elements of one stop line, else of the same heads, are one light: Autoware's maps have one for each way on.
+  /// Adds a regulatory element to its light. Elements that share a stop line (without one: the same heads) are one
+  /// light, since Autoware's maps have an element for each onward lane.
   void collect_light(int32_t index) {
     const Relation& relation = file_.relations[index];
     const auto usable = [&](std::string_view role) {
@@ -99,7 +101,7 @@ class RuleBuilder {
                                                  "expected a way with the role refers");
     }
     if (lanes_of_rule_[index].empty()) {
-      if (is_referred_to_[index]) return;  // a light for those who walk
+      if (is_referred_to_[index]) return;  // a light for pedestrians
       return file_.where(relation).record_repair(build_.faults, RepairKind::laneless_light,
                                                  "expected a lanelet that refers to it as regulatory_element");
     }
@@ -124,7 +126,7 @@ class RuleBuilder {
     return to_vec3((sum / static_cast<double>(points.size())).eval());
   }
 
-  /// Tagged lanes lead to the stop line, or begin at it.
+  /// Finds incoming and connecting lanes. A tagged lane either leads to the stop line or begins at it.
   void find_lanes(Approach* approach) {
     sort_unique(&approach->heads);
     sort_unique(&approach->tagged);
@@ -145,7 +147,8 @@ class RuleBuilder {
       (begins_there ? approach->connecting : approach->incoming).push_back(index);
       if (begins_there) add_driving(lane.predecessors, &approach->incoming);
     }
-    // What follows a lane that another element of the line calls a lane from the line on is none that leads to it.
+    // A lane may be incoming by one regulatory element and connecting by another. It is then only connecting, since it
+    // does not lead to the line.
     sort_unique(&approach->incoming);
     sort_unique(&approach->connecting);
     std::erase_if(approach->incoming, [&](int32_t lane) {
@@ -169,7 +172,7 @@ class RuleBuilder {
       if (dot((light->stop_a_m - light->stop_b_m).xy(), left) < 0) std::swap(light->stop_a_m, light->stop_b_m);
       return;
     }
-    // Across the ends of the lanes.
+    // Without a stop line in the file, the line spans the ends of the lanes.
     float left_m = -1e30f, right_m = 1e30f;
     for (const int32_t each : is_incoming ? approach.incoming : approach.connecting) {
       const LanePoint& end = is_incoming ? end_of(map_, each) : start_of(map_, each);
@@ -209,9 +212,9 @@ class RuleBuilder {
     map_.provenance.lights.push_back(build_.source_of(-1, relation.offset));
   }
 
-  /// The first junction on the ways on from a light, or -1.
+  /// Returns the first junction on the lanes after a light, or -1.
   int32_t junction_ahead(const Approach& approach) const {
-    std::vector<std::pair<int32_t, float>> ahead;  // lanes, and the way up to their start
+    std::vector<std::pair<int32_t, float>> ahead;  // lanes, and the distance to their start
     std::set<int32_t> known(approach.connecting.begin(), approach.connecting.end());
     for (const int32_t lane : approach.connecting) ahead.emplace_back(lane, 0.0f);
     for (std::size_t i = 0; i < ahead.size(); ++i) {
@@ -230,7 +233,7 @@ class RuleBuilder {
     return -1;
   }
 
-  /// Sets the head: among several the one farthest ahead, which waiting vehicles see.
+  /// Sets the head. Of several heads the one farthest ahead is used, which waiting vehicles can see.
   void set_head(const Approach& approach, Vec2 forward, TrafficLight* light) const {
     const Vec3 middle = (light->stop_a_m + light->stop_b_m) * 0.5f;
     float best_m = -std::numeric_limits<float>::infinity();
@@ -246,7 +249,7 @@ class RuleBuilder {
     }
   }
 
-  /// Ways that are traffic signs, with the lanes of the regulatory elements that refer to them.
+  /// Adds the ways that are traffic signs, with the lanes of the regulatory elements that refer to them.
   void add_signs() {
     std::map<int32_t, std::vector<int32_t>> lanes_of_sign;
     for (std::size_t i = 0; i < file_.relations.size(); ++i) {
@@ -265,7 +268,7 @@ class RuleBuilder {
       Sign sign{.name = std::to_string(way.id)};
       set_type(way.tags.of("subtype"), &sign);
       sign.position_m = center_of(index);
-      // As its traffic sees it, the line runs from the left edge to the right one.
+      // As seen by the traffic, a sign's line runs from its left edge to its right edge.
       const Points line = build_.points_of(index);
       const Eigen::Vector2d right = (line.back() - line.front()).head<2>();
       sign.heading_rad = static_cast<float>(std::atan2(right.x(), -right.y()));
@@ -288,7 +291,8 @@ class RuleBuilder {
         ->heading_rad;
   }
 
-  /// A region and a number, like de206 or usR1-1; Autoware's stop_sign is 206 of OpenDRIVE's catalogue.
+  /// Sets a sign's type from a region and a number, like de206 or usR1-1. Autoware's stop_sign becomes 206 of
+  /// OpenDRIVE's catalogue.
   static void set_type(std::string_view subtype, Sign* sign) {
     if (subtype == "stop_sign") {
       sign->type = "206";
@@ -310,10 +314,10 @@ class RuleBuilder {
   Build& build_;
   RoadMap& map_;
   const OsmFile& file_;
-  std::vector<std::vector<int32_t>> lanes_of_rule_;      // [relations]
-  std::vector<bool> is_referred_to_;                     // [relations] by a lanelet of any kind
+  std::vector<std::vector<int32_t>> lanes_of_rule_;  // [relations]
+  std::vector<bool> is_referred_to_;                 // [relations] whether a lanelet of any kind refers to the relation
   std::map<std::vector<int32_t>, Approach> approaches_;  // by stop line, or by heads
-  std::map<int32_t, std::vector<double>> axes_;          // by junction: the heading of the first light of each phase
+  std::map<int32_t, std::vector<double>> axes_;          // by junction: headings of the first light of each phase
 };
 
 }  // namespace
