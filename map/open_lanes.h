@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// Minimum length of way ahead of an open lane's start.
+/// Minimum length of route ahead of an open lane's start.
 constexpr float kMinOpenWay_m = 20.0f;
 
 /// Whether an endless route starts at some lane outside junctions. Agents then drive only on endless lanes, and all

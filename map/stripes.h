@@ -10,11 +10,11 @@ namespace pictura {
 /// Dashes of 3 m with gaps of 9 m: the North American pattern, which CARLA's towns imitate.
 constexpr double kDash_m = 3.0, kDashPeriod_m = 12.0;
 
-/// The line moved to its left in plan. It must have at least two points, of which none repeats the previous one.
-/// Corners are mitred, sharp corners at most to twice the offset.
+/// Returns the line moved to its left in plan. Corners are mitred; a sharp corner moves by at most twice the offset.
+/// The line must have two or more points, none of which equals the point before it.
 std::vector<CurvePoint> moved_left(const std::vector<CurvePoint>& line, double offset_m);
 
-/// The part of a line between two lengths along it.
+/// Returns the part of a line between two arc lengths.
 std::vector<CurvePoint> part_of(const std::vector<CurvePoint>& line, double begin_m, double end_m);
 
 double plan_length_m(const std::vector<CurvePoint>& line);

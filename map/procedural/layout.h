@@ -87,8 +87,8 @@ inline Pose mouth_pose(const Node& node, const Arm& arm, const Street& street, d
   return offset_right(on_ray, arm.at_start ? street.start_offset_m : -street.end_offset_m);
 }
 
-/// Radius of the left border of a right turn into an arm that is `gap_rad` away: wide, but close enough to the corner
-/// that no hole is left beside lanes that go straight or cross.
+/// Radius of the left border of a right turn into an arm at the angle `gap_rad`. The turn is wide, but close enough to
+/// the corner that no gap in the surface is left between it and the lanes that go straight or cross.
 double right_turn_radius_m(double gap_rad, double lane_width_m);
 
 class Layout {
