@@ -14,7 +14,7 @@
 
 namespace pictura::opendrive {
 
-/// Indices into RoadMap::lanes of a section's lanes, from the center outwards; -1 for lanes without surface.
+/// Indices of a section's lanes in RoadMap::lanes, from the center outwards; -1 for lanes without surface.
 struct SectionLanes {
   std::vector<int32_t> left, right;
 
@@ -48,8 +48,8 @@ struct Build {
   }
 };
 
-/// Whether traffic on a side (given by the sign of its lane ids) travels towards growing s: on the right of the
-/// reference line under right-hand traffic.
+/// Whether traffic on a side, given by the sign of its lane ids, travels towards growing s. In right-hand traffic this
+/// is the right side of the reference line.
 constexpr bool travels_forward(const FileRoad& road, int side) { return (side < 0) != road.left_hand; }
 inline bool travels_forward(const FileRoad& road, const FileLane& lane) {
   return travels_forward(road, lane.id) != (lane.direction == LaneDirection::reversed);
@@ -74,7 +74,7 @@ void build_road_edges(Build* build);
 /// Removes road edges where traffic leaves and enters a map without endless roads, and records missing links.
 void open_road_ends(Build* build);
 
-/// Build lane marks; then crosswalks, parking spaces and stop lines.
+/// build_markings() builds lane marks; build_objects() builds crosswalks, parking spaces and stop lines.
 void build_markings(Build* build);
 void build_objects(Build* build);
 

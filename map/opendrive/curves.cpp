@@ -90,7 +90,7 @@ double parameter_at(const PlaneCubic& cubic, double fraction) {
 /// Converts a point in the frame of the piece's start to file coordinates.
 Eigen::Vector2d in_file(const GeometryPiece& piece, const Eigen::Vector2d& p) {
   const double c = std::cos(piece.heading), s = std::sin(piece.heading);
-  // Added from left to right, so that the bits of maps do not change.
+  // The sum is evaluated from left to right; another order would change the bits of maps.
   return Eigen::Vector2d{piece.x, piece.y} + p.x() * Eigen::Vector2d{c, s} + p.y() * Eigen::Vector2d{-s, c};
 }
 
@@ -246,18 +246,19 @@ Bounds bounds_between(const Profile& profile, double begin, double end) {
   return bounds;
 }
 
-/// Upper bound, between two breaks, of the second derivative of points on a lane, including its borders or points
-/// `beyond_m` outside them. With the curvature k of the reference line and the lateral position t, it is the derivative
-/// of c + t n: k't + 2kt' along, and k(1 - kt) + t'' across.
+/// Returns an upper bound, between two breaks, of the second derivative by s of points on a lane, its borders, and up
+/// to `beyond_m` outside them. A point is c + t n, with the reference line c, its normal n, its curvature k, and the
+/// lateral position t. Its second derivative has the components k't + 2kt' along the line and k(1 - kt) + t'' across
+/// it.
 double bend_between(const FileRoad& road, const FileSection& section, int lane, double beyond_m, double begin,
                     double end) {
   constexpr double kUnknown = std::numeric_limits<double>::infinity();
-  constexpr double kZero_m = -1e-9;  // negative widths count as zero, which makes a kink
+  constexpr double kZero_m = -1e-9;  // negative widths count as zero, so the width has a kink there
   const GeometryPiece& piece = last_item_at(road.geometry, 0.5 * (begin + end));
   if (piece.cubic || road.deformation || end <= begin) return kUnknown;
   const Bounds offset = bounds_between(road.lane_offset, begin, end);
   double near = 0, far = 0, slope = offset.slope,
-         bend = offset.bend;  // distances of the lane's borders from the centre
+         bend = offset.bend;  // near, far: distances of the lane's borders from lane 0
   const std::vector<FileLane>& side = lane > 0 ? section.left : section.right;
   for (std::size_t i = 0; i < static_cast<std::size_t>(std::abs(lane)); ++i) {
     if (!side[i].border.cubics.empty()) return kUnknown;
@@ -276,7 +277,7 @@ double bend_between(const FileRoad& road, const FileSection& section, int lane, 
     for (const double t : {t_low, t_high}) across = std::max(across, std::abs(curvature * (1 - curvature * t)));
   }
   const double change = std::abs(piece.end_curvature - piece.start_curvature) / piece.length;
-  // For a spiral, k(1 - kt) may be largest in between.
+  // For a spiral, k(1 - kt) may be largest between the breaks.
   if (change > 0) across = k * (1 + k * std::max(std::abs(t_low), std::abs(t_high)));
   return change * std::max(std::abs(t_low), std::abs(t_high)) + 2 * k * slope + across + bend +
          bounds_between(road.elevation, begin, end).bend;
@@ -393,8 +394,8 @@ double heading_between(const FileRoad& road, const FileSection& section, int inn
   const double lateral = t * std::cos(roll);
   const double lateral_slope = slope * std::cos(roll) - t * std::sin(roll) * road.superelevation.slope(s);
   const Pose pose = pose_at(road, s);
-  // A lateral slope turns the line away from the reference line, more so on the inside of a curve. Slopes are the
-  // formulae's derivatives, since files have steps between cubics.
+  // A lateral slope turns the line away from the reference line, more so on the inside of a curve. Slopes are
+  // derivatives of the formulae instead of differences, since files have steps between cubics.
   return pose.heading + std::atan2(lateral_slope, pose.stretch * (1.0 - pose.curvature * lateral));
 }
 

@@ -1,5 +1,5 @@
-// Positions relative to a reference line: OpenDRIVE's lines, arcs, spirals and plane cubics, and the cubics for
-// elevation, banking, offsets and widths. In double, in file coordinates.
+// Positions relative to a reference line, which consists of OpenDRIVE's lines, arcs, spirals and plane cubics; and the
+// cubics for elevation, banking, offsets and widths. Numbers are doubles in file coordinates.
 #pragma once
 
 #include <cmath>
@@ -13,13 +13,13 @@ namespace pictura::opendrive {
 struct Pose {
   Eigen::Vector2d position_m{0, 0};
   double heading = 0, curvature = 0;
-  double stretch = 1;  // metres of the line per metre of s, on deformed roads
+  double stretch = 1;  // metres of the line per metre of s; 1 except on deformed roads
 };
 
 /// Fills the table of arc lengths of a cubic up to its p_end.
 void measure(PlaneCubic* cubic);
 
-/// Fills the integration panels of a spiral; other pieces have none.
+/// Fills the integration panels of a spiral. Does nothing for other pieces, which have none.
 void measure(GeometryPiece* piece);
 
 /// Pose at distance `ds` from the start of a piece: exact for lines and arcs, Gauss-Legendre quadrature for spirals,
@@ -27,13 +27,14 @@ void measure(GeometryPiece* piece);
 /// the piece.
 Pose pose_on(const GeometryPiece& piece, double ds);
 
-/// The pose of the reference line at s; s is clamped to the road.
+/// Returns the pose of the reference line at s, which is clamped to the road.
 Pose pose_at(const FileRoad& road, double s);
 
 /// Moves a point at s to its place on a deformed road; returns the point unchanged on other roads.
 Eigen::Vector2d deformed_point(const FileRoad& road, double s, const Eigen::Vector2d& point_m);
 
-/// Length of the reference line from `begin` to `end`: their difference except on deformed roads.
+/// Returns the length of the reference line between the stations `begin` and `end`; it is their difference except on
+/// deformed roads.
 double length_between(const FileRoad& road, double begin, double end);
 
 /// A place on the reference line: its position, the unit vector to its left, and its elevation.
@@ -107,8 +108,8 @@ constexpr int inner_border(int lane_id) { return lane_id > 0 ? lane_id - 1 : lan
 std::vector<double> formula_changes(const FileRoad& road, const FileSection& section, int border, double begin,
                                     double end);
 
-/// Returns the breaks of formula_changes() with upper bounds of second derivatives: of the lane's width and of the
-/// positions of its points. Points include the lane's borders or points up to `beyond_m` outside them.
+/// Returns the breaks of formula_changes(), and for each interval upper bounds of two second derivatives: of the lane's
+/// width, and of the positions of points on the lane, its borders, and up to `beyond_m` outside them.
 CurveBreaks breaks_of(const FileRoad& road, const FileSection& section, int lane, double begin, double end,
                       double beyond_m = 0);
 

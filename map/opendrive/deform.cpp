@@ -13,7 +13,7 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Maximum distance of the reference lines of linked roads that belong together.
+// Maximum distance between reference lines at linked ends. Ends that are farther apart get equal shifts.
 constexpr double kMaxLinkOffset_m = 40.0;
 
 /// Ends of roads, numbered 2 * road + (0: start, 1: end), in groups of linked ends.
@@ -69,7 +69,7 @@ class ShiftSolver {
 
   /// Returns the shifts [ends].
   std::vector<Eigen::Vector2d> solve() {
-    // Roads outside junctions keep their first shift, however short they are, and their neighbours follow.
+    // Roads outside junctions keep the first shift that they get, however short they are, and linked roads follow.
     for (std::size_t road = 0; road < network_.roads.size(); ++road) {
       if (is_in_junction(2 * road)) continue;
       for (const std::size_t end : {2 * road, 2 * road + 1}) set_shift(end, Eigen::Vector2d::Zero());
@@ -81,7 +81,7 @@ class ShiftSolver {
         }
       }
     }
-    // The remaining ends are of roads between junctions' own roads: the first of a group stays.
+    // The remaining groups have only ends of roads within junctions. The first end of such a group is not shifted.
     for (std::size_t end = 0; end < ends_.size(); ++end) take_members(end);
     std::vector<Eigen::Vector2d> all;
     for (std::size_t end = 0; end < ends_.size(); ++end) {

@@ -28,7 +28,8 @@ class Element {
   [[noreturn]] void fail(fmt::format_string<Args...> format, Args&&... args) const {
     where().fail_with(fmt::format(format, std::forward<Args>(args)...));
   }
-  /// Records a fault that the caller repairs by action_of(kind); strict reading throws it.
+  /// Records a fault that the caller repairs by action_of(kind). In strict reading, throws Error with its message
+  /// instead.
   template <typename... Args>
   void record_repair(RepairKind kind, fmt::format_string<Args...> format, Args&&... args) const {
     where().record_repair(faults_, kind, format, std::forward<Args>(args)...);
@@ -51,7 +52,7 @@ class Element {
   std::string_view name() const { return node_.name(); }
   Element with_owner(const std::string* owner) const { return {node_, source_, faults_, owner}; }
 
-  /// Whether the attribute exists and has a value: some writers leave unset attributes empty.
+  /// Whether the attribute exists and is not empty, since some writers leave unset attributes empty.
   bool has(const char* attribute) const;
   std::string text(const char* attribute) const;
   std::string text(const char* attribute, const char* fallback) const;
@@ -91,8 +92,8 @@ class Element {
 inline constexpr double kStationTolerance_m = 1e-3;
 
 /// Reads the station in `attribute` from which a record applies, within [0, length]. Repaired: a record before the
-/// start applies from the start; a record beyond the end has no station and is omitted. A missing attribute counts as
-/// `fallback`, if given.
+/// start applies from the start; a record beyond the end is omitted, and nullopt is returned. A missing attribute
+/// counts as `fallback`, if given.
 std::optional<double> read_station(const Element& record, const char* attribute, double length,
                                    std::optional<double> fallback = std::nullopt);
 
@@ -108,7 +109,7 @@ void append_record(const Element& element, const char* attribute, double Record:
   records->push_back(std::move(record));
 }
 
-/// Sorts records by station, keeping the file's order at equal stations: the last such record counts.
+/// Sorts records by station. Records at equal stations keep the order of the file, since the last of them is in effect.
 template <typename Record>
 void sort_records(double Record::* station, std::vector<Record>* records) {
   std::stable_sort(records->begin(), records->end(),

@@ -9,11 +9,13 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Tolerance of negative widths, which count as 0: writers round where a lane tapers off.
+// Tolerance of negative widths, which count as 0. Where a lane tapers off, rounding by writers makes widths slightly
+// negative.
 constexpr double kWidthTolerance_m = 0.01;
 constexpr double kMaxWidth_m = 500;
 constexpr double kMaxBanking_rad = 1.4;
-// Between stations all quantities are cubics of s, which their values at five points bound within a small factor.
+// Between stations all quantities are cubics of s. The values of a cubic at five points bound the cubic within a small
+// factor.
 constexpr int kProbes = 4;
 
 template <typename Probe>

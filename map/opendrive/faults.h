@@ -1,4 +1,4 @@
-// Faults of a file that have one sensible meaning. They are repaired and recorded, or refused in strict reading.
+// Faults of a file that have one sensible meaning. Such faults are repaired and recorded, or refused in strict reading.
 #pragma once
 
 #include <string>

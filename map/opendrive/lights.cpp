@@ -52,7 +52,7 @@ struct Head {
   std::optional<double>* stop_s = nullptr;
 };
 
-/// Sets the line of each head to that of the first head among those that traffic meets within 20 m.
+/// Sets the stop line of each head. Heads within 20 m share the line at the head that traffic meets first.
 void find_lines(bool forward, std::vector<Head>* heads) {
   std::sort(heads->begin(), heads->end(),
             [forward](const Head& a, const Head& b) { return forward ? a.s < b.s : a.s > b.s; });

@@ -15,7 +15,7 @@ bool applies_to(const FileLane& lane, const FileRoad& road, Orientation orientat
                 const std::vector<LaneRange>& validity);
 
 /// Splits sections at the stop lines of lights that no controller controls and whose lanes lead to no junction. Heads
-/// of one orientation within 20 m share a line, where traffic reaches the first head.
+/// of one orientation within 20 m share a stop line, which is at the head that traffic reaches first.
 void split_at_lights(Network* network);
 
 }  // namespace pictura::opendrive

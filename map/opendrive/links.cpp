@@ -1,4 +1,4 @@
-// Links of lanes: from lanes' own links, across the links of their roads, and from junctions' connections.
+// Links of lanes: from the lanes' own links, across the links of their roads, and from the connections of junctions.
 #include <algorithm>
 #include <set>
 
@@ -14,7 +14,7 @@ namespace {
 // lane).
 constexpr float kMaxLinkGap_m = 1.0f;
 
-/// One end of a lane, by s of its road.
+/// One end of a lane: its start or end by s of its road.
 struct LaneEnd {
   int road = 0, section = 0, id = 0;
   ContactPoint end = ContactPoint::start;

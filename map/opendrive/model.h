@@ -1,5 +1,6 @@
-// The contents of an OpenDRIVE file as plain structs in the file's own terms: s and t along reference lines, lane ids,
-// signal ids. The reader fills them and checks every attribute; the build stages turn them into a RoadMap.
+// Contents of an OpenDRIVE file as plain structs in the file's own terms: s and t along reference lines, lane ids,
+// signal ids. The reader fills the structs and checks every attribute; the build stages turn the structs into a
+// RoadMap.
 #pragma once
 
 #include <array>
@@ -57,12 +58,12 @@ struct SourceLocation {
   }
 };
 
-/// a + b ds + c ds^2 + d ds^3 for s' >= s, with ds = s' - s.
+/// The cubic a + b ds + c ds^2 + d ds^3 at a station s' >= s, with ds = s' - s.
 struct Cubic {
   double s = 0, a = 0, b = 0, c = 0, d = 0;
 };
 
-/// A piecewise cubic function of s, in ascending order of s; 0 before the first cubic.
+/// A piecewise cubic function of s; its value is 0 before the first cubic. Cubics are in ascending order of s.
 struct Profile {
   std::vector<Cubic> cubics;
 
@@ -77,8 +78,8 @@ struct PlaneCubic {
   std::array<double, 17> arc_length{};  // arc length from the start to p = p_end * i / 16; see measure() in curves.h
 };
 
-/// A piece of a reference line: a cubic, or a curve whose curvature changes linearly from start to end (line: both 0,
-/// arc: both equal).
+/// A piece of a reference line: a cubic, or a curve whose curvature changes linearly from start to end. Lines have
+/// curvatures of 0, arcs equal curvatures at both ends.
 struct GeometryPiece {
   double s = 0, x = 0, y = 0, heading = 0, length = 0;
   double start_curvature = 0, end_curvature = 0;
@@ -87,7 +88,7 @@ struct GeometryPiece {
   std::vector<std::array<double, 2>> panels;
 };
 
-/// One stripe of a mark, from <line>.
+/// One stripe of a mark, read from a <line> element.
 struct MarkLine {
   double length = 0, space = 0;  // lengths of a dash and of the following gap; explicit lines have no gap
   double t_offset = 0;           // offset of the stripe's centre line to the left of the lane's border
@@ -105,9 +106,9 @@ struct RoadMark {
   MarkColor color = MarkColor::white;
   double width = 0;                           // 0: not given
   LaneChange lane_change = LaneChange::both;  // permitted directions of lane changes across the mark
-  std::vector<MarkLine> lines;                // repeated along the mark; replace the pattern of the type
-  std::vector<MarkLine> explicit_lines;       // each painted once
-  Profile sway;                               // lateral shift of the lines to the left, by s - start of the mark
+  std::vector<MarkLine> lines;                // repeated along the mark, instead of the pattern of `type`
+  std::vector<MarkLine> explicit_lines;       // painted once each
+  Profile sway;  // lateral shift of the lines to the left, as a function of s minus the mark's start
   SourceLocation where;
 };
 
@@ -126,8 +127,8 @@ struct FileLane {
   std::vector<int> predecessors, successors;
   // Functions of s minus the section's s.
   Profile width;
-  Profile border;                      // used without widths: t of the outer border, relative to the reference line
-  Profile inner_height, outer_height;  // constant; height above the road at the lane's borders
+  Profile border;  // used if the lane has no widths: t of the outer border, relative to the reference line
+  Profile inner_height, outer_height;  // piecewise constant; height above the road at the lane's borders
   Profile speed_limit_mps;             // constant; 0: no limit
   std::vector<RoadMark> marks;         // on the outer border, in ascending order of s_offset
   SourceLocation where;
@@ -136,7 +137,7 @@ struct FileLane {
 struct FileSection {
   double s = 0, end = 0;
   FileLane center;
-  std::vector<FileLane> left, right;  // outwards: ids 1, 2, ... and -1, -2, ...
+  std::vector<FileLane> left, right;  // from the centre outwards: ids 1, 2, ... and -1, -2, ...
   SourceLocation where;
 
   const FileLane* lane(int id) const;
@@ -170,7 +171,7 @@ struct FileSignal {
   SourceLocation where;
 };
 
-/// Reference that makes a signal apply to lanes of the road that contains the reference.
+/// Reference in a road to a signal of any road; it makes the signal apply to lanes of the reference's road.
 struct SignalReference {
   std::string signal;
   double s = 0, t = 0;
@@ -180,7 +181,7 @@ struct SignalReference {
   SourceLocation where;
 };
 
-/// An object. Outline corners are (u, v) in the object's frame, or (s, t) along the road.
+/// An object. The corners of its outline are (u, v) in the object's frame; with along_road they are (s, t) of the road.
 struct FileObject {
   enum class Kind : uint8_t { crosswalk, parking_space, stop_line } kind = Kind::crosswalk;
   std::string id, name;
@@ -200,7 +201,7 @@ struct CrossSection {
 };
 
 /// Deformation of a road's points in a copy of its map; see deform.h. The shift of the reference line changes from
-/// start to end as a smoothstep of s, so that headings at both ends are those of the plan.
+/// start to end as a smoothstep of s, so that headings at both ends are those of the mapped line.
 struct RoadDeformation {
   PlanMap plan;
   std::array<double, 2> start_shift_m{}, end_shift_m{};
@@ -215,9 +216,9 @@ struct FileRoad {
   std::vector<GeometryPiece> geometry;
   std::optional<RoadDeformation> deformation;  // if set, s is a parameter instead of an arc length
   Profile elevation, lane_offset;
-  Profile superelevation;                   // rad, about the reference line, left side up
-  Profile left_crossfall, right_crossfall;  // rad, down from the reference line
-  std::vector<CrossSection> shape;          // in ascending order of s, linear in between
+  Profile superelevation;                   // rad, rotation about the reference line; positive: left side up
+  Profile left_crossfall, right_crossfall;  // rad, slope of each side; positive: down from the reference line
+  std::vector<CrossSection> shape;          // in ascending order of s; interpolated linearly between them
   std::vector<FileSection> sections;
   std::vector<FileObject> objects;
   std::vector<FileSignal> signals;

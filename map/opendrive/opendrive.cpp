@@ -15,7 +15,7 @@ namespace pictura {
 
 namespace {
 
-/// Faults of the network as a whole do not name the file.
+/// Imports the network. Errors that concern the network as a whole do not name the file; the caller adds the name.
 RoadMap import_network(std::string_view text, const std::string& source, const OpenDriveOptions& options,
                        const ImportProgress& progress) {
   const InterruptibleWork work(fmt::format("{}: interrupted while it was imported", source));
@@ -36,7 +36,7 @@ RoadMap import_network(std::string_view text, const std::string& source, const O
   if (options.plan == PlanMap{}) {
     map.geo_reference = network.geo_reference;
   } else {
-    opendrive::deform(options.plan, &network);  // a copy has no place on Earth
+    opendrive::deform(options.plan, &network);  // a deformed copy has no place on Earth
   }
   opendrive::Build build{network, options, &faults, &map, import_budget(text.size(), source, work), {}, {}, {}};
   begin("lanes", 0.1);

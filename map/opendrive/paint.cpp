@@ -117,7 +117,8 @@ class MarkPainter {
             p.z() = point_on_lane(road_, section_, lane_, s, 1, &build_.stations).z();
           return CurvePoint{s, p, 0};
         });
-    // On the inner side of a bend tighter than its offset, a mark would run backwards and cross itself.
+    // On the inner side of a bend whose radius is smaller than the mark's offset, a mark would run backwards and cross
+    // itself.
     std::size_t begin = 0;
     for (std::size_t i = 1; i < points.size(); ++i) {
       if (!runs_back(points[i - 1], points[i])) continue;
@@ -272,7 +273,7 @@ void add_parking_space(Build* build, std::size_t road_index, const FileObject& o
         "expected a parking space with a length and a width of at least {} m, got {} and {}", kMinParking_m, length_m,
         width_m);
   }
-  // Rows keep their number of spaces: along the road, each space stretches with the road.
+  // Each space stretches with the road, so that rows along the road keep their number of spaces.
   if (road.deformation) {
     length_m *= stretch_towards(pose, object.heading);
     width_m *= stretch_towards(pose, object.heading + 0.5 * std::numbers::pi);
@@ -282,7 +283,7 @@ void add_parking_space(Build* build, std::size_t road_index, const FileObject& o
     std::swap(width_m, length_m);
     heading += 0.5 * std::numbers::pi;
   }
-  // The heading of the traffic on this side of the road is used, not the opposite one.
+  // The space's heading is the one of two opposite headings that is closer to the traffic on this side of the road.
   const bool forward = travels_forward(road, object.t > 0 ? 1 : -1);
   const double traffic = pose.heading + (forward ? 0.0 : std::numbers::pi);
   if (std::cos(heading - traffic) < 0) heading += std::numbers::pi;

@@ -16,12 +16,12 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr double kMaxCoordinate_m = 1e8, kMaxHeading_rad = 1e3;
-constexpr double kMaxTurn_rad = 100.0;    // per geometry: 16 turns, enough for a helix
-constexpr double kMaxGap_m = 0.1;         // between two geometries of a reference line, and of its length
+constexpr double kMaxTurn_rad = 100.0;  // maximum turn of a geometry: 16 full turns, enough for a helix
+constexpr double kMaxGap_m = 0.1;  // maximum gap between two geometries, and maximum error of a reference line's length
 constexpr double kMaxLengthError = 0.01;  // relative error of a <paramPoly3>'s length, in addition to kMaxGap_m
-constexpr double kMaxJump_m = 5.0;        // larger gaps have no single meaning
-constexpr double kMaxStep_m = 0.5;        // maximum step of the elevation: larger ones are walls to cars
-constexpr std::size_t kMaxJumps = 1000;   // per road: bounds the time of smoothing
+constexpr double kMaxJump_m = 5.0;        // maximum jump that is repaired; larger gaps have no single meaning
+constexpr double kMaxStep_m = 0.5;        // maximum step of the elevation; a larger one would be a wall to cars
+constexpr std::size_t kMaxJumps = 1000;   // maximum number per road; bounds the time of smoothing
 // Maximum turn at a geometry shorter than kStationTolerance_m; beyond it, the heading of the geometry has no meaning.
 constexpr double kMaxKink_rad = 0.2;
 // Maximum error of a length, absolute or as a share, that is repaired by cutting or extending.
@@ -33,7 +33,7 @@ bool can_cut(double error_m, double length_m) {
 
 /// A <geometry> and its parsed contents.
 struct Geometry {
-  double s = 0;  // as in the file
+  double s = 0;  // station in the file
   Element element;
   GeometryPiece piece;
 };
@@ -119,9 +119,9 @@ double distance_m(const GeometryPiece& before, const GeometryPiece& piece) {
   return (Eigen::Vector2d{piece.x, piece.y} - pose_on(before, before.length).position_m).norm();
 }
 
-/// Joins the stations of a geometry and the previous one. The previous geometry is cut or extended if the error is
-/// small, or if its end is then no further away. Otherwise the geometry is moved along s. Returns the distance of this
-/// move.
+/// Makes a geometry begin at the station at which the previous one ends. The previous geometry is cut or extended if
+/// the error is small, or if this does not increase the gap between them. Otherwise the geometry is moved along s.
+/// Returns the distance of this move.
 double join_stations(const Geometry& geometry, GeometryPiece* before, GeometryPiece* piece) {
   const double end = before->s + before->length, error = piece->s - end;
   if (std::abs(error) <= kStationTolerance_m) return 0;
@@ -165,8 +165,8 @@ double turn_between(const GeometryPiece& piece, const GeometryPiece& next) {
   return std::abs(std::remainder(next.heading - pose_on(piece, piece.length).heading, 2 * std::numbers::pi));
 }
 
-/// Drops geometries of nearly no length whose heading differs from that of the next one or, for the last, of the
-/// previous one.
+/// Drops geometries of nearly no length whose heading differs from that of the next geometry. The last geometry is
+/// compared with the previous one.
 void drop_kinks(std::vector<Geometry>* geometries) {
   std::vector<Geometry> kept;
   for (std::size_t i = 0; i < geometries->size(); ++i) {
@@ -188,7 +188,8 @@ void drop_kinks(std::vector<Geometry>* geometries) {
   *geometries = std::move(kept);
 }
 
-/// Joins the geometries, which together are the road, whatever length the file gives for it.
+/// Joins the geometries into the reference line. Its length becomes the road's length, even if the file gives another
+/// length.
 void join_geometry(const std::vector<Geometry>& geometries, FileRoad* road) {
   double moved = 0;  // sum of the moves so far
   for (const Geometry& geometry : geometries) {
@@ -238,7 +239,7 @@ void read_elevation(const Element& profile, double described, FileRoad* road) {
   if (!jumps.empty()) spread_height_jumps(jumps, road);
 }
 
-/// Makes a straight road from the start of the first geometry.
+/// Returns a straight line of this length from the start of the first geometry.
 GeometryPiece straight_piece(const Element& plan_view, double length) {
   GeometryPiece piece = {};
   const Element first = plan_view.required_child("geometry");

@@ -101,7 +101,8 @@ LaneDirection read_direction(const Element& element) {
   return LaneDirection::standard;
 }
 
-/// Reads a lane's type. A centre lane has no surface of any type; a lane without a type is a special lane.
+/// Reads a lane's type. A centre lane has no surface, whatever its type; a lane without a type attribute is a special
+/// lane.
 void read_type(const Element& element, bool is_center, FileLane* lane) {
   lane->type_name = element.text("type", is_center ? "none" : "special1");
   if (!element.has("type")) element.record_repair(RepairKind::missing_lane_type, "attribute type is missing");
@@ -207,8 +208,8 @@ void read_side(const Element& section, const char* side, int sign, double sectio
   if (std::abs(before) != static_cast<int>(lanes_out->size())) fill_gaps(sign, lanes_out);
 }
 
-/// The <laneSection> elements and their starts on the road, sorted. A section beyond the end is moved there, so that it
-/// has no length and read_lanes() bridges it.
+/// A <laneSection> element and its start on the road. A section that starts beyond the road's end is moved to the end,
+/// so that it has no length and read_lanes() bridges it.
 struct SectionElement {
   double s = 0;
   Element element;
@@ -233,7 +234,7 @@ std::vector<SectionElement> section_elements(const Element& lanes, double road_l
   return sections;
 }
 
-/// Reads the sections. A singleSide section gives one side; the lanes of the other side continue.
+/// Reads the sections. A singleSide section defines the lanes of one side; the lanes of the other side continue.
 std::vector<FileSection> read_sections(const Element& lanes, double road_length) {
   const std::vector<SectionElement> elements = section_elements(lanes, road_length);
   std::vector<FileSection> sections;

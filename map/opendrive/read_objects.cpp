@@ -24,8 +24,8 @@ bool contains_word(std::string text, std::string_view word) {
   return text.find(word) != std::string::npos;
 }
 
-/// Returns the kinds that RoadMap stores, and nothing for other kinds. OpenDRIVE has no type for stop lines: they are
-/// road marks of the subtype signalLines, or objects with that name.
+/// Returns the kind of an object if RoadMap stores it, else nullopt. OpenDRIVE has no object type for stop lines; files
+/// contain them as road marks of the subtype signalLines, or as objects with such a name.
 std::optional<FileObject::Kind> kind_of(const Element& element) {
   const std::string type = element.text("type", "none");
   if (type == "crosswalk") return FileObject::Kind::crosswalk;
@@ -38,7 +38,7 @@ std::optional<FileObject::Kind> kind_of(const Element& element) {
   return std::nullopt;
 }
 
-/// Whether an object or signal lies beside its road; if not, it is repaired by omission.
+/// Whether an object or signal lies beside its road. If not, the fault is repaired by omitting it.
 bool is_near_road(const Element& element, double road_length) {
   const double low_s = -kMaxOverhang_m, high_s = road_length + kMaxOverhang_m;
   const double s = element.number("s"), t = element.number_or_zero("t");
@@ -74,7 +74,7 @@ Element outer_outline(const Element& element) {
   return outline;
 }
 
-/// Reads an outline; nothing where a corner lies far from the road.
+/// Reads an outline; returns nullopt if a corner lies far from the road.
 std::optional<std::vector<FileObject::Corner>> read_outline(const Element& element, double road_length) {
   std::vector<FileObject::Corner> corners;
   bool is_near = true;
@@ -91,7 +91,7 @@ std::optional<std::vector<FileObject::Corner>> read_outline(const Element& eleme
   return corners;
 }
 
-/// Reads an object; nothing where it lies far from its road.
+/// Reads an object; returns nullopt if it lies far from its road.
 std::optional<FileObject> read_object(const Element& element, FileObject::Kind kind, double road_length) {
   FileObject object;
   object.where = element.where();
@@ -111,7 +111,7 @@ std::optional<FileObject> read_object(const Element& element, FileObject::Kind k
   return object;
 }
 
-/// Whether the copies of a <repeat> can be made; if not, this is repaired by placing the object once.
+/// Whether the copies of a <repeat> can be made. If not, the fault is repaired by placing the object once.
 bool can_repeat(const Element& repeat, const FileObject& object) {
   const double distance = repeat.number_in("distance", 0, kMaxRoadLength_m);
   if (distance < kMinRepeat_m) {

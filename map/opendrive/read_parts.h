@@ -10,9 +10,9 @@ namespace pictura::opendrive {
 inline constexpr double kMinRoadLength_m = 1e-3, kMaxRoadLength_m = 1e5;
 inline constexpr double kMaxOffset_m = 1e4, kMaxHeight_m = 1e4;
 
-/// Reads <planView>, <elevationProfile> and <lateralProfile>: the reference line, its elevation and banking. Uses the
-/// road's length and sets it to the length of the line, so the other parts must be read afterwards. Returns the s up to
-/// which the file describes the road; see hold_profiles().
+/// Reads <planView>, <elevationProfile> and <lateralProfile>: the reference line, its elevation and banking. Replaces
+/// the road's length by the length of the line, so the other parts must be read afterwards. Returns the s up to which
+/// the file describes the road; see hold_profiles().
 double read_reference_line(const Element& road_element, FileRoad* road);
 
 /// Reads <lanes>: lane offset, sections, and lanes with their marks.
@@ -30,7 +30,8 @@ void read_road_links(const Element& road_element, FileRoad* road);
 FileJunction read_junction(const Element& element);
 FileController read_controller(const Element& element);
 
-/// Reads the attributes max and unit of a <speed>, in m/s; 0: no limit. Repaired: an unreadable speed gives no value.
+/// Reads the attributes max and unit of a <speed>, in m/s; 0: no limit. Repaired: for an unreadable speed nullopt is
+/// returned.
 std::optional<double> read_speed_mps(const Element& element);
 
 }  // namespace pictura::opendrive

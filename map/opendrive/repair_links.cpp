@@ -10,8 +10,8 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Maximum distance of touching road ends. It is used to repair links, never to remove links on which a file is
-// consistent.
+// Maximum distance at which road ends count as touching. It is used to repair links, never to remove links that both
+// roads state.
 constexpr double kTouch_m = 1.0;
 
 const char* name_of(ContactPoint end) { return end == ContactPoint::start ? "start" : "end"; }
@@ -28,7 +28,7 @@ RoadLink* link_at(FileRoad* road, ContactPoint end) {
   return end == ContactPoint::start ? &road->predecessor : &road->successor;
 }
 
-/// Removes a road's link except for its location, by which lanes know that a link existed.
+/// Removes a road's link except for its location, which tells lanes that a link existed.
 void clear_link(RoadLink* link) {
   link->kind = RoadLink::Kind::none;
   link->id.clear();
@@ -45,7 +45,7 @@ double distance_m(const FileRoad& a, ContactPoint end_a, const FileRoad& b, Cont
   return (position_of(a, end_a) - position_of(b, end_b)).norm();
 }
 
-/// Returns the end of `b` that touches an end of `a`; `contact` if both ends or neither end touch it.
+/// Returns the end of `b` that touches the given end of `a`; `contact` if both ends or neither end of `b` touch it.
 ContactPoint touching_end(const FileRoad& a, ContactPoint end, const FileRoad& b, ContactPoint contact) {
   const bool touches = distance_m(a, end, b, contact) <= kTouch_m;
   return !touches && distance_m(a, end, b, other_end(contact)) <= kTouch_m ? other_end(contact) : contact;
@@ -78,7 +78,8 @@ class LinkRepairer {
     return found == network_.road_index.end() ? nullptr : &network_.roads[found->second];
   }
 
-  /// Checks that the target of a road's link exists and that the contact point is the end that lies there.
+  /// Checks that the target of a road's link exists, and that the contact point is the end of the target that touches
+  /// the road.
   void check_target(FileRoad* road, ContactPoint end) {
     RoadLink* const link = link_at(road, end);
     if (link->kind == RoadLink::Kind::junction && !network_.junction_index.contains(link->id)) {
@@ -107,8 +108,8 @@ class LinkRepairer {
     }
   }
 
-  /// Checks that a link between two roads is mutual. Where the other road's end refers to a third road, geometry
-  /// decides.
+  /// Checks that a link between two roads is mutual. If the other road's end refers to a third road, geometry decides
+  /// whether the link is kept.
   void check_return(FileRoad* road, ContactPoint end) {
     RoadLink* const link = link_at(road, end);
     if (link->kind != RoadLink::Kind::road) return;
@@ -137,7 +138,7 @@ class LinkRepairer {
   }
 
   /// Finds both ends of a connection: by the connecting road's link, else by the incoming road's link to the junction,
-  /// else by geometry. Returns false where the roads do not meet; this is repaired by omitting the connection.
+  /// else by geometry. Returns false if the roads do not meet; the fault is repaired by omitting the connection.
   bool find_ends(const FileJunction& junction, Connection* connection) {
     const FileRoad* const incoming = road_named(connection->incoming_road);
     const FileRoad* const connecting = road_named(connection->connecting_road);

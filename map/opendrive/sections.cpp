@@ -9,7 +9,7 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr double kMinSplitSection_m = 0.5;
-constexpr double kSameStation_m = 1e-6;  // rounding of writers
+constexpr double kSameStation_m = 1e-6;  // tolerance for the rounding of writers
 
 /// Returns the same cubic with its start at s.
 Cubic moved_to(double s, const Cubic& cubic) {
@@ -53,11 +53,12 @@ std::vector<double> speed_changes(const FileRoad& road, const FileSection& secti
   return changes;
 }
 
-/// Connects the links of a section's lanes through the lanes of an adjacent section, which is removed.
+/// Replaces links of a section's lanes to an adjacent section, which is removed, by the links of that section's lanes
+/// beyond it.
 void link_across(const FileSection& removed, std::vector<int> FileLane::* links, FileSection* section) {
   for (std::vector<FileLane>* side : {&section->left, &section->right}) {
     for (FileLane& lane : *side) {
-      // Targets are unique: repeated links would double with every removed section.
+      // Targets are made unique, since repeated links would double with every removed section.
       std::vector<int> targets;
       for (const int id : lane.*links) {
         const FileLane* through = removed.lane(id);
@@ -71,7 +72,8 @@ void link_across(const FileSection& removed, std::vector<int> FileLane::* links,
   }
 }
 
-/// Removes a profile's records within [begin, end); the last of them continues from `end` if the profile does.
+/// Removes a profile's records within [begin, end). If the road goes on and no record begins at `end`, the last removed
+/// record continues from there.
 void cut_out(double begin, double end, bool goes_on, Profile* profile) {
   std::vector<Cubic>& cubics = profile->cubics;
   const auto from = [&](double s) {
@@ -88,7 +90,7 @@ void cut_out(double begin, double end, bool goes_on, Profile* profile) {
   cubics.erase(first, last);
 }
 
-/// Makes a profile constant from s on, unless it has records more than a millimetre beyond.
+/// Makes a profile constant from s on, unless it has records that begin more than a millimetre beyond s.
 void hold(double s, Profile* profile) {
   std::vector<Cubic>& cubics = profile->cubics;
   if (cubics.empty() || cubics.back().s > s + kStationTolerance_m) return;
@@ -103,13 +105,13 @@ void bridge_section(std::size_t index, FileRoad* road) {
   std::vector<FileSection>& sections = road->sections;
   const FileSection removed = std::move(sections[index]);
   const bool goes_on = index + 1 < sections.size();
-  // An offset within the section alone would shift the ends of adjacent sections.
+  // A lane offset that applies only within the removed section would shift the ends of adjacent sections.
   cut_out(removed.s, removed.end, goes_on, &road->lane_offset);
   if (index > 0) {
     link_across(removed, &FileLane::successors, &sections[index - 1]);
     sections[index - 1].end = removed.end;
   }
-  // The next section keeps its start, to which its cubics and marks are relative.
+  // The next section keeps its start, since its cubics and marks are relative to that.
   if (goes_on) link_across(removed, &FileLane::predecessors, &sections[index + 1]);
   sections.erase(sections.begin() + static_cast<std::ptrdiff_t>(index));
 }

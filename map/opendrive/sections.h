@@ -1,5 +1,5 @@
-// Operations on sections: splitting, removing, and ending their profiles. Lanes that continue from one FileSection into
-// the next are one lane of the file.
+// Operations on sections: splitting and removing sections, and ending profiles. Lanes that continue from one
+// FileSection into the next are one lane of the file.
 #pragma once
 
 #include <vector>
@@ -8,16 +8,16 @@
 
 namespace pictura::opendrive {
 
-/// Splits the lanes of a section at `ds` after its start, and returns the parts beyond as lanes of a new section. The
-/// lanes and their continuations are linked to each other.
+/// Splits the lanes of a section at `ds` after its start. The lanes keep the parts before; the parts beyond are
+/// returned as lanes of a new section. Each lane and its continuation are linked to each other.
 std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds);
 
-/// Removes a section without length. The previous section is extended over it, its neighbours are linked to each other,
-/// and the lane offset is that of the adjacent sections.
+/// Removes a section without length. The previous section is extended to its end, links that led into it lead to the
+/// section beyond, and a lane offset that applies only within it is removed.
 void bridge_section(std::size_t index, FileRoad* road);
 
-/// Makes elevation, banking, lane offset and widths constant from s on, where the file's description ends. Cubics are
-/// not extrapolated.
+/// Makes elevation, banking, lane offset and widths constant from s on, where the file's description ends, instead of
+/// extrapolating their cubics.
 void hold_profiles(double s, FileRoad* road);
 
 /// Returns the last section that begins at or before s, or the first section.

@@ -1,6 +1,6 @@
 // Construction of junctions, traffic lights and signs. A light refers to lanes of a connecting road, or of the road
-// that leads to the junction. The lane graph gives the rest: the stop line is at the start of the junction's lanes,
-// their predecessors are the incoming lanes, and the light faces these.
+// that leads to the junction. The rest follows from the lane graph: the stop line is at the start of the junction's
+// lanes, the predecessors of these lanes are the incoming lanes, and the light faces the incoming lanes.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -16,8 +16,8 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Height of a head above the foot of its post, which the file does not contain. Posts beyond the junction have a mast
-// arm.
+// Height of a head above the foot of its post, which files do not contain. A head beyond the junction is assumed to
+// hang on a mast arm.
 constexpr double kNearHeadHeight_m = 3.5, kFarHeadHeight_m = 5.5;
 // Distance beyond the stop line from which a head is on the far side.
 constexpr float kFarHead_m = 5.0f;
@@ -90,7 +90,7 @@ class SignalBuilder {
   /// Approaches by the index of the approach road and by whether its traffic runs along s.
   using Approaches = std::map<std::pair<int32_t, bool>, Approach>;
 
-  /// An approach without a controller: all heads there share one line.
+  /// An approach without a controller. All heads of the approach share one stop line.
   struct UncontrolledLine {
     std::size_t signal_index = 0;  // index of the first head
     Approach approach;
@@ -165,7 +165,7 @@ class SignalBuilder {
   template <typename Signal>
   void collect(std::size_t signal_index, std::size_t road, const Signal& signal) {
     const FileRoad& file_road = build_.network.roads[road];
-    // References are often placed mid-road, so the lane ids of the section there are used.
+    // References are often placed in the middle of a road, so lane ids refer to the section at their station.
     const FileSection& section = section_at(file_road, signal.stop_s.value_or(signal.s));
     const SectionLanes& lanes = build_.lanes[road][&section - file_road.sections.data()];
     for (const std::vector<FileLane>* side : {&section.left, &section.right}) {
@@ -253,7 +253,7 @@ class SignalBuilder {
                                "no controller of a junction controls it");
     for (const auto& [way, approach] : approaches) {
       const int32_t junction_index = junction_of(approach);
-      // On roads, lines are distinguished by their lanes.
+      // Away from junctions, lines are distinguished by their lanes.
       const int32_t first = junction_index < 0 ? approach.incoming.front() : -1;
       const auto [line, is_new] = uncontrolled_.try_emplace({junction_index, way, first});
       if (is_new) line->second.signal_index = signal_index;
@@ -276,7 +276,7 @@ class SignalBuilder {
   /// Adds a light for each line without a controller. Lines of one junction with equal or opposite headings share a
   /// phase; a line away from junctions is alone.
   void add_uncontrolled_lights() {
-    std::map<int32_t, std::vector<double>> headings;  // [junction] of the first line of each phase
+    std::map<int32_t, std::vector<double>> headings;  // [junction] headings of the first line of each phase
     for (auto& [key, line] : uncontrolled_) {
       Phase phase{std::get<0>(key), 0};
       if (phase.junction >= 0) {
@@ -302,7 +302,8 @@ class SignalBuilder {
     const FileSignal& signal = *placed_signals_[signal_index].signal;
     Sign sign{.name = signal.id, .type = signal.type, .subtype = signal.subtype, .country = signal.country};
     sign.position_m = build_.to_map(position_of(signal_index));
-    // The heading of the lanes to which it applies is used, since orientations set by editors are unreliable.
+    // A sign has the heading of the lanes to which it applies, if there are any, since orientations set by editors are
+    // unreliable.
     double heading = pose_at(build_.network.roads[placed_signals_[signal_index].road], signal.s).heading;
     if (signal.orientation == Orientation::against) heading += std::numbers::pi;
     if (!signal_lanes_[signal_index].empty()) {

@@ -10,10 +10,11 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr double kMinSpan_m = 10, kSpanPerJump = 10;
-// Minimum span per jump: a smoothstep is 1.5 times as steep as its chord, so over this span it turns by less than 0.2
-// rad.
+// Minimum ratio of span to jump. A smoothstep is 1.5 times as steep as its chord, so over this span the line turns by
+// less than 0.2 rad.
 constexpr double kMinSpanPerJump = 7.5;
-constexpr double kMaxCubic_m = 1;  // length of the cubics that replace a moved line, to within 0.1 mm
+// Maximum length of the cubics that replace a moved line; their error is then below 0.1 mm.
+constexpr double kMaxCubic_m = 1;
 
 /// Range of s over which a jump is spread.
 struct Stretch {
@@ -68,7 +69,7 @@ class JumpSpreader {
   }
 
  private:
-  /// Appends the geometry itself, or cubics in its place where it touches a stretch.
+  /// Appends the geometry, or cubics that replace it if it touches a stretch.
   void replace(std::size_t index) {
     const GeometryPiece& piece = road_.geometry[index];
     const double piece_end = piece.s + piece.length;

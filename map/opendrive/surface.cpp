@@ -1,5 +1,5 @@
-// Lane surfaces of an OpenDRIVE network as bands: road edges are the outline of the drivable lanes, and building lines
-// run on free ground.
+// Construction of road edges and building lines from the lane surfaces, as bands, of an OpenDRIVE network. Road edges
+// are the outline of the drivable lanes; building lines run on free ground.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,15 +12,15 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Road edges need a much more precise surface than the drawn one.
+// Chord error of the bands for road edges, which must be much more precise than the drawn surface.
 constexpr double kEdgeBandChordError_m = 0.001;
-// Building lines keep a clearance from the surface, so less precision is enough.
+// Chord error of the bands for building lines. These keep a clearance from the surface, so less precision is enough.
 constexpr double kLotBandChordError_m = 0.05;
 constexpr double kBandPiece_m = 5.0;
 
 constexpr double kSetback_m = 1.0;    // distance of a building from the outermost lane
 constexpr double kLotDepth_m = 6.0;   // depth of free ground behind a building's line
-constexpr double kClearance_m = 0.5;  // from any surface, including beyond the ends of a building line
+constexpr double kClearance_m = 0.5;  // distance of a building from any surface, including beyond the ends of its line
 constexpr double kProbeStep_m = 1.0;
 constexpr double kBuildingPiece_m = 8.0;  // length of a piece of a building line
 constexpr double kAnyLevel_m = 1e9;
@@ -143,12 +143,12 @@ void build_building_lines(Build* build) {
         const double step = (section.end - section.s) / pieces;
         for (int i = 0; i < pieces; ++i) {
           build->budget.count_sample();
-          // Directed so that the road is to the right.
+          // The line is directed so that the road is to its right.
           const double low = section.s + i * step, high = i + 1 == pieces ? section.end : section.s + (i + 1) * step;
           const Eigen::Vector3d a = at(sign > 0 ? low : high), b = at(sign > 0 ? high : low);
           const double length_m = plan_distance_m(a, b);
           if (length_m < 2 * kClearance_m || length_m > kMaxPiece_m || !is_free(surface, a, b)) continue;
-          // On the inside of a bend tighter than the offset, the line reverses direction.
+          // On the inside of a bend whose radius is smaller than the offset, the line reverses direction.
           const double heading = pose_at(road, 0.5 * (low + high)).heading;
           const Eigen::Vector2d forward{std::cos(heading), std::sin(heading)};
           if (sign * (b - a).head<2>().dot(forward) < 0.5 * length_m) continue;

@@ -60,7 +60,7 @@ void add_road_link(pugi::xml_node link, const char* name, const RoadLink& road_l
 void add_cubic_curve(pugi::xml_node geometry, const GeometryPiece& piece) {
   const auto& [u, v, p_end, arc_length] = *piece.cubic;
   const bool is_normalized = p_end == 1;
-  // A <poly3> has u = p and ends where the curve is as long as the piece.
+  // A <poly3> has u = p, and its p_end follows from the length of the piece.
   if (u == std::array<double, 4>{0, 1, 0, 0} && !is_normalized && p_end != piece.length) {
     add(geometry, "poly3", {{"a", v[0]}, {"b", v[1]}, {"c", v[2]}, {"d", v[3]}});
     return;
@@ -187,7 +187,8 @@ void add_lane(pugi::xml_node side, const FileLane& lane, const std::vector<int>&
 
 bool is_continued(const std::vector<FileLane>& side) { return !side.empty() && side.front().is_continued; }
 
-/// Returns the successors of a lane; if it continues in single-sided sections, those of its last part.
+/// Returns the successors of a lane. If the lane continues in later sections, these are the successors of its last
+/// part.
 std::vector<int> successors_of(const FileRoad& road, std::size_t section, const FileLane& lane) {
   while (section + 1 < road.sections.size()) {
     const FileLane* next = road.sections[section + 1].lane(lane.id);
@@ -286,7 +287,8 @@ void add_signals(pugi::xml_node road_node, const FileRoad& road) {
   }
 }
 
-/// Assigns object ids: the object's own id, unless it is empty or already used in the file (copies of a <repeat>).
+/// Assigns object ids: the object's own id, or a new one if it is empty or already used in the file, as by copies of a
+/// <repeat>.
 class ObjectIds {
  public:
   explicit ObjectIds(const Network& network) {

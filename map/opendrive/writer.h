@@ -18,8 +18,8 @@ std::string write_opendrive(const Network& network);
 
 namespace pictura {
 
-/// Reads the text of an OpenDRIVE file and writes only the data that the importer uses. Throws Error naming `source`,
-/// line and element if the importer rejects the file.
+/// Reads the text of an OpenDRIVE file and returns OpenDRIVE text with only the data that the importer uses. Throws
+/// Error naming `source`, line and element if the importer rejects the file.
 std::string export_opendrive(std::string_view text, const std::string& source);
 
 }  // namespace pictura
