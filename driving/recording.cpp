@@ -45,7 +45,7 @@ std::string quoted(const std::string& word) {
 }
 
 void report_file(const std::string& path, const Replay& replay) {
-  std::error_code none;  // set for devices, which have no size
+  std::error_code none;  // receives the error of devices, which have no size
   const auto bytes = std::filesystem::file_size(path, none);
   print_message("{}: {} agents, {} steps{}\n", path, replay.num_agents, replay.num_frames - 1,
                 none ? "" : fmt::format(", {:.2f} MB", static_cast<double>(bytes) / 1e6));

@@ -16,26 +16,28 @@ class PolicySession;
 struct DrivenWorld;
 
 struct RecordingOptions {
-  std::optional<int> followed;  // empty: resolve_followed() chooses
+  std::optional<int> followed;  // number of the followed agent; empty: resolve_followed() chooses it
   bool cameras = false;
 };
 
-/// Follows the world's first agent if none was requested. Throws UsageError if the world lacks the requested agent.
+/// Sets the followed agent to the world's default agent (DrivenWorld::first_agent) if none was requested. Throws
+/// UsageError if the world lacks the requested agent.
 void resolve_followed(const DrivenWorld& world, RecordingOptions* options_inout);
 
-/// Driver of a recorded world, and the renderer of its images. A controller has no session; its cameras are the
-/// paper's.
+/// Driver of a recorded world, and the renderer of the driver's images. A controller has no session, and the cameras of
+/// its replays are the paper's.
 struct RecordedDriver {
-  std::string policy;  // as requested
+  std::string policy;  // name or path, as requested
   PolicySession* session = nullptr;
   Renderer* renderer = nullptr;  // renderer of the session's images
 };
 
-/// Renderer configuration of the policy's images; the paper's for a controller.
+/// Returns the renderer configuration of the policy's images; that of the paper's cameras for a controller.
 RendererConfig cameras_of(const RecordedDriver& driver);
-/// The policy's present response for an agent of the only world; empty if the policy does not drive.
+/// Returns the policy's response to an agent's present observation in the only world; empty if no policy drives or the
+/// agent is not active.
 std::optional<ReplayDecision> decision_of_agent(Simulator& simulator, const RecordedDriver& driver, int agent);
-/// Origin of a replay: this process, its command and the driver.
+/// Returns the origin of a replay: this process, its command and the driver.
 ReplayOrigin origin_of(const RecordedDriver& driver);
 
 /// Records the only world of a simulator in host memory.
@@ -64,7 +66,7 @@ void write_mcap_with_message(const std::string& path, const Replay& replay);
 /// Removes the pages of a gallery that earlier calls wrote, lists the other pages, and reports the gallery on stderr.
 void write_index(FilledFolder* pages);
 
-/// This process's command as a shell would read it, with the program's name without its folder.
+/// Returns this process's command, quoted for a shell; the program's name has no folder.
 std::string command_line();
 
 }  // namespace pictura

@@ -69,7 +69,7 @@ std::string about(const CornerState& one, int32_t removed, CornerControl control
                      removed < 0 ? "nobody" : fmt::format("agent {}", removed));
 }
 
-// Options that drive a case's scene again, by its driver.
+// Returns options of an evaluation that drives a case's scene again, by the scene's driver.
 EvaluateOptions driven_by(const ProbeOptions& probe, const CasePlace& place) {
   EvaluateOptions driven = probe.worlds;
   // A controller's index follows all policies.
@@ -80,7 +80,7 @@ RecordedScenario scenario_of(const ProbeOptions& probe, const ProbeResults& resu
   return {.number = place.scene, .agents_per_world = results.agents_per_world, .world_of = probe.policies[0]};
 }
 
-// Reports an ego whose speed differs in the replay, where speeds are rounded to 1 cm/s.
+// Reports if the ego's speed in the replay differs from that in the probe. Speeds in replays are rounded to 1 cm/s.
 void compare_speed(const std::string& path, const Replay& replay, int frame, int ego, float probed_mps) {
   const double speed_mps = 0.01 * replay.at(Track::speed_mps, frame, ego);
   if (std::abs(speed_mps - double{probed_mps}) < 0.0051) return;

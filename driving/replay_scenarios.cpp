@@ -39,7 +39,7 @@ class ScenarioRecorder final : public EvaluationObserver {
   std::optional<Recording> recording_;
 };
 
-// Keeps the states of all agents of the only world, and the world after `step` steps.
+// Observer that keeps the states of all agents of the only world, and a copy of the world after `step` steps.
 class ScenarioKeeper final : public EvaluationObserver {
  public:
   explicit ScenarioKeeper(int step) : step_(step) {}
@@ -61,7 +61,7 @@ class ScenarioKeeper final : public EvaluationObserver {
   std::shared_ptr<const SavedWorld> kept_;
 };
 
-// Options of an evaluation of one scenario, on the host.
+// Returns options of an evaluation of one scenario on the host.
 EvaluateOptions options_of(const EvaluateOptions& options, const RecordedScenario& scenario) {
   EvaluateOptions one = options;
   one.agents_per_world = scenario.agents_per_world;
@@ -106,8 +106,8 @@ ScenarioCounts drive(const EvaluateOptions& options, const RecordedScenario& sce
   return report.results.densities[0].scenarios[0];
 }
 
-// Sort key of scenarios, larger is worse: share of vehicles with infractions, then of collisions at fault, then less
-// distance.
+// Returns the sort key of a scenario, which is larger for worse scenarios: share of vehicles with at-fault infractions,
+// then share with collisions at fault, then negative distance.
 std::array<double, 3> severity_key(const ScenarioCounts& counts) {
   const auto vehicles = static_cast<double>(std::max<int64_t>(1, counts.vehicles));
   return {static_cast<double>(counts.at_fault_infraction) / vehicles, static_cast<double>(counts.at_fault) / vehicles,
@@ -119,7 +119,8 @@ const ScenarioCounts& counts_of(const EvaluationResults& results, const Scenario
   return density.scenarios[place.scenario - density.first_scenario];
 }
 
-// Follows the scenario's worst agent if no agent was requested and the evaluation names it.
+// Returns the recording options with the scenario's worst agent as the followed agent, if no agent was requested and
+// the evaluation contains the worst agent.
 RecordingOptions following_worst(RecordingOptions recording, const EvaluationResults& results,
                                  const ScenarioPlace& place) {
   const DensityResult& density = results.densities[place.density];
@@ -165,7 +166,7 @@ Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& s
                        const RecordingOptions& recording, ScenarioCounts* counts_out) {
   EvaluateOptions one = options_of(options, scenario);
   const std::unique_ptr<PolicySession> session = session_of(one);
-  // The followed agent's policy needs its own renderer, which holds the scenario's map.
+  // The policy's responses for the followed agent need a separate renderer that holds the scenario's map.
   std::unique_ptr<Renderer> renderer = session ? session->make_renderer() : nullptr;
   ScenarioRecorder recorder({session ? one.checkpoint : one.controller, session.get(), renderer.get()}, recording);
   one.observer = &recorder;

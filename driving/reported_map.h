@@ -1,4 +1,4 @@
-// Loads maps and reports on stderr the repairs of their files.
+// Loading of maps, with a report of the files' repairs on stderr.
 #pragma once
 
 #include <memory>
@@ -11,8 +11,8 @@ namespace pictura {
 /// Calls load_map(), and reports on stderr if faults of the file were repaired.
 std::shared_ptr<const RoadMap> load_reported_map(const std::string& name);
 
-/// Prints a line on stderr for each kind of repaired fault: the number, the repair, and the first fault. `source` names
-/// the file.
+/// Prints a line on stderr for each kind of repaired fault: the number of faults, the repair, and the first fault.
+/// `source` is the file's name in messages.
 void print_repairs(const RoadMap& map, const std::string& source);
 
 }  // namespace pictura

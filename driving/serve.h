@@ -21,8 +21,8 @@ struct ServeOptions {
 std::unique_ptr<LiveView> serve(const ServeOptions& options, Simulator& simulator, const RecordedDriver& driver,
                                 const RecordingOptions& recording);
 
-/// Waits until the next step is due: for the first page, until no page pauses it, and for its pace. Returns false after
-/// an interrupt.
+/// Waits until the next step is due: until the first page is open, no page pauses the simulation, and its pace allows
+/// the step. Returns false after an interrupt.
 bool await_step(LiveView& view);
 
 }  // namespace pictura
