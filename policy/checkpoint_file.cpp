@@ -45,7 +45,7 @@ CheckpointFile::CheckpointFile(std::string_view file, const std::string& its_pat
   const auto version = at_offset<uint32_t>(file, 8);
   PICTURA_CHECK(version == kVersion || version == kVersionHashingDataAlone,
                 "{}: expected checkpoint version {} or {}, got {}", path, kVersionHashingDataAlone, kVersion, version);
-  std::string_view content = file;  // without the hash
+  std::string_view content = file;  // without the hash at the end
   if (version == kVersion) {
     PICTURA_CHECK(file.size() >= kPreamble + sizeof(uint64_t), "{}: truncated: {} bytes", path, file.size());
     content.remove_suffix(sizeof(uint64_t));

@@ -1,7 +1,8 @@
-// Checkpoint file: a policy, which sessions read, and everything else that a run needs to continue
+// Checkpoint file: a policy, which sessions read, and all other data that a run needs to continue
 // (training/checkpoint.h). Layout: the eight bytes PICTCKPT, u32 version, u32 byte order mark, u64 length of a JSON
 // header, the header, the data that the header describes, u64 hash (FNV-1a) of all preceding bytes. Version 1 has no
-// such hash; its header holds a hash of the data. Only for the files that read and write checkpoints.
+// hash at its end; its header holds a hash of the data. Only code that reads and writes checkpoints should include this
+// header.
 #pragma once
 
 #include <string>
@@ -15,7 +16,7 @@
 
 namespace pictura {
 
-/// Whether the bytes of a file begin like a checkpoint.
+/// Whether the bytes of a file begin like those of a checkpoint.
 bool is_checkpoint(std::string_view file);
 
 /// Header and data of a checkpoint's bytes. The bytes must outlive the object.
@@ -37,12 +38,12 @@ struct CheckpointFile {
   std::string_view data;
 };
 
-/// Builds a checkpoint: data are appended, and the header records where each part begins.
+/// Builder of a checkpoint. Each part's data are appended to `data`, and the header records where the part begins.
 struct CheckpointWriter {
   nlohmann::ordered_json header;
   std::string data;
 
-  /// Adds configuration, schema, rig and counters of a policy. add_weights() adds its weights.
+  /// Adds configuration, schema, rig and counters of a policy, without its weights.
   void add_policy(const PolicyFacts& policy);
   void add_weights(const StoredPolicy& policy);
   void add_tensors(const char* list, const std::vector<StoredTensor>& tensors);

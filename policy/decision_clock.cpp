@@ -6,7 +6,7 @@ namespace pictura {
 
 namespace {
 
-// Values of each slot's world: [slots].
+// Returns each slot's element of an array over worlds: [slots].
 template <typename T>
 at::Tensor values_of_slots(const SimulatorArrays& input, Span<const T> of_worlds) {
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());

@@ -33,7 +33,7 @@ StoredPolicy resized_policy(const StoredPolicy& policy, ImageSize size) {
   }
   StoredPolicy result = policy;
   result.config.policy.patch_px *= factor;
-  // Rounded to the value that a person would write: .35 times 3 is 1.05, not 1.0499999999999998.
+  // The product is rounded to the value that a person would write: .35 times 3 is 1.05, not 1.0499999999999998.
   result.config.render.line_floor_px = std::round(1e6 * factor * config.render.line_floor_px) / 1e6;
   if (result.config.policy.patch_px > kMaxPatch_px || result.config.render.line_floor_px > kMaxLineFloor_px) {
     fail_usage("{}: size: expected patches of at most {} px and lines of at most {} px, got {} and {} for {}x{}",
@@ -42,7 +42,7 @@ StoredPolicy resized_policy(const StoredPolicy& policy, ImageSize size) {
   }
   result.config.render.width_px = size.width_px;
   result.config.render.height_px = size.height_px;
-  result.config.render.schedule.clear();  // belongs to the run at the old size
+  result.config.render.schedule.clear();  // the schedule belongs to the run at the old size
   result.rig = paper_rig(size.width_px, size.height_px);
   const auto first = std::find_if(result.parameters.begin(), result.parameters.end(),
                                   [](const StoredTensor& parameter) { return parameter.name == kFirstConvolution; });

@@ -12,7 +12,7 @@ namespace pictura {
 /// Type to which the weights of a file are rounded.
 enum class WeightType {
   f32,   // unchanged
-  bf16,  // half the size: relative steps of 2^-8
+  bf16,  // half the file size, with relative steps of 2^-8
 };
 
 struct ExportedPolicy {
@@ -29,8 +29,8 @@ struct ExportOptions {
   std::optional<ImageSize> size;  // image size: a whole multiple k of the policy's width and height
 };
 
-/// Writes the policy of a checkpoint, or of safetensors, to `out`, as write_policy() does. With a size, patches and
-/// line floor are k times as large, and the first convolution is spread over the larger patches
+/// Writes the policy of a checkpoint, or of safetensors, to `out`, as write_policy() does. With options.size, patches
+/// and line floor become k times as large, and the first convolution is spread over the larger patches
 /// (policy/patch_spread.h). Throws Error naming the file that cannot be read or written, or that holds no average.
 /// Throws UsageError naming `size` if the policy cannot have that size.
 ExportedPolicy export_policy(const std::string& policy_path, const std::string& out, const ExportOptions& options);

@@ -8,7 +8,8 @@ namespace {
 
 constexpr int kChannelMultiple = 8;
 
-// Inputs of outputs in an array: each output reads `run` numbers in each of `kernel` rows, which are row_step apart.
+// Places of outputs' inputs in an array: each output reads `run` numbers in each of `kernel` rows, which are row_step
+// apart.
 struct Windows {
   const int64_t* begins;  // first element of each window's first row
   int64_t count, kernel, run, row_step;
@@ -142,8 +143,8 @@ PICTURA_INLINE void all_image_gradients(const Windows& windows, int64_t outputs,
 
 enum class Pass { outputs, weight_gradient, image_gradient };
 
-// Runs one of the three passes, from two arrays: windows and weight, windows and gradient, or gradient and weight. Uses
-// vectors of sixteen, or of eight with half as many in registers.
+// Runs one of the three passes on two arrays: windows and weight, windows and gradient, or gradient and weight. Uses
+// vectors of sixteen floats, or of eight floats with half as many values in registers.
 template <bool kIsWide>
 PICTURA_INLINE void run(Pass pass, const Windows& windows, int64_t outputs, const float* a, const float* b,
                         float* out) {

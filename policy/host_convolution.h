@@ -1,5 +1,6 @@
-// Convolutions of few outputs on the host, without the matrices of taps that matrix products need: registers hold the
-// sums of several outputs while taps are read in place. Single-threaded, on contiguous fp32 arrays.
+// Convolutions with few output channels on the host. Convolution by matrix products needs a matrix of each output's
+// inputs (taps). Here registers hold the sums of several outputs instead, while taps are read in place.
+// Single-threaded, on contiguous fp32 arrays.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +23,7 @@ struct ConvolutionSize {
   int64_t padded_numbers() const { return (height + 2 * (kernel / 2)) * padded_width() * channels; }
 };
 
-/// Convolution of blocks of images. Its bits do not depend on the vector width.
+/// Convolution of blocks of images. The bits of its results do not depend on the vector width.
 class DirectConvolution {
  public:
   /// Whether the convolution supports this number of outputs, and the image gradient this number of channels.
@@ -44,15 +45,16 @@ class DirectConvolution {
   void compute_image_gradient(const float* grad_out, const float* weight, float* images_grad_out);
 
  private:
-  /// Calls f(offset of the row in padded_, its offset in images, its number of values) for each row of the images.
+  /// Calls f(offset of the row in padded_, offset of the row in images, number of values in the row) for each row of
+  /// the images.
   template <typename F>
   void for_each_row(const F& f) const;
 
   ConvolutionSize size_;
   int64_t outputs_, n_ = 0;
   bool is_wide_;
-  std::vector<float> padded_, padded_grad_;  // [most, height, width, channels] with padding
-  std::vector<int64_t> windows_;             // offset in padded_ at which each output's inputs begin
+  std::vector<float> padded_, padded_grad_;  // [max_images, height, width, channels] with padding
+  std::vector<int64_t> windows_;             // offsets in padded_ at which each output's inputs begin
 };
 
 }  // namespace pictura::host

@@ -25,7 +25,7 @@ namespace {
 
 using Numbers = std::vector<float>;
 
-// Returns memory for at least `numbers` floats, kept from call to call.
+// Returns memory for at least `numbers` floats, which is reused by later calls.
 float* room(Numbers* memory, int64_t numbers) {
   if (memory->size() < static_cast<size_t>(numbers)) memory->resize(static_cast<size_t>(numbers));
   return memory->data();
@@ -88,7 +88,7 @@ struct Norm {
   }
 };
 
-/// Reads parameters of a file by name.
+/// Reader of a file's parameters by name.
 class ParameterReader {
  public:
   explicit ParameterReader(const StoredPolicy& saved) : saved_(saved) {}
@@ -169,7 +169,7 @@ class SetEncoder {
       host::largest_members(its_embeddings, counts.data(), count, width_, largest.data(), which.data());
       for (int64_t i = 0; i < count; ++i) {
         for (int64_t c = 0; c < width_; ++c) {
-          // Adding the bias to every member would not change the maximum.
+          // The bias is added after the maximum, since it does not change which member is the largest.
           to[i * width() + static_cast<int64_t>(g) * width_ + c] =
               largest[i * width_ + c] + (counts[i] > 0 ? group.encoder.out.bias[c] : 0);
         }
@@ -181,7 +181,7 @@ class SetEncoder {
   struct SetGroup {
     Group encoder;
     RowSize size;
-    int64_t max_members, set;  // rows of the array; its column of set_counts
+    int64_t max_members, set;  // max_members: rows of the set's array; set: column of set_counts
     std::string array;
   };
   static const float* members_of(const ObservationView& arrays, const SetGroup& group) {
@@ -259,7 +259,7 @@ class ImageEncoder {
   void encode(const float* pooled, int64_t count, float* to) const { project_.apply(pooled, count, to); }
 
  private:
-  /// Memory of a thread.
+  /// Working memory of one thread.
   struct Scratch {
     Numbers images, taps, next, scores, sums, attended, hidden;
   };
@@ -378,7 +378,7 @@ class ImageEncoder {
     mlp_norm_.apply(pooled, queries, width_);
     float* const hidden = room(&scratch->hidden, queries * mlp_hidden_.out);
     mlp_hidden_.apply_gelu(pooled, queries, hidden);
-    // The last layer is linear, so it is applied to the mean over the queries.
+    // The last layer is linear, so it is applied once to the mean over the queries.
     Numbers mean(static_cast<size_t>(mlp_hidden_.out)), added(static_cast<size_t>(width_));
     mean_of_rows(hidden, queries, mlp_hidden_.out, mean.data());
     mlp_out_.apply(mean.data(), 1, added.data());
@@ -485,7 +485,7 @@ struct HostNetwork::Parts {
     return x;
   }
 
-  // Computes agents [begin, begin + count). pooled: ImageEncoder::pool() of all agents.
+  // Computes the outputs of agents [begin, begin + count). pooled: result of ImageEncoder::pool() for all agents.
   void forward(const ObservationView& arrays, const Numbers& pooled, int64_t begin, int64_t count, float* logits_out,
                float* values_out) const {
     const int64_t scene_width = images ? images->width() : sets->width();
@@ -504,7 +504,7 @@ struct HostNetwork::Parts {
   }
 
   const Config config;
-  std::unique_ptr<ImageEncoder> images;  // null for a vector policy, else sets is null
+  std::unique_ptr<ImageEncoder> images;  // null for a vector policy; otherwise `sets` is null
   std::unique_ptr<SetEncoder> sets;
   RowFeatures waypoint_features;
   Group ego, conditioning;
@@ -520,7 +520,7 @@ HostNetwork::~HostNetwork() = default;
 
 void HostNetwork::forward(const HostObservation& observation, int num_threads, float* logits_out,
                           float* values_out) const {
-  constexpr int64_t kAgentsAtOnce = 16;  // their activations fit a core's cache
+  constexpr int64_t kAgentsAtOnce = 16;  // the activations of this number of agents fit a core's cache
   const Numbers pooled = parts_->images ? parts_->images->pool(observation, num_threads) : Numbers();
   parallel_for(num_threads, (observation.agents + kAgentsAtOnce - 1) / kAgentsAtOnce, [&](int64_t block) {
     const int64_t begin = block * kAgentsAtOnce, count = std::min(kAgentsAtOnce, observation.agents - begin);

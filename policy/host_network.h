@@ -1,5 +1,5 @@
-// Forward pass of a saved policy on the host, in fp32 and without torch. Computes the same as PolicyNetwork
-// (policy/policy.h) within the rounding of sums.
+// Forward pass of a saved policy on the host, in fp32 and without torch. Its outputs equal those of PolicyNetwork
+// (policy/policy.h) up to the rounding of sums.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace pictura {
 struct HostImageBlock {
   const uint8_t* pixels = nullptr;
   int64_t height_px = 0, width_px = 0;
-  std::vector<int> cameras;  // their indices in the rig
+  std::vector<int> cameras;  // indices of these cameras in the rig
 };
 
 /// Observations of a batch of agents: arrays [agents, rows, features] in the order of PICTURA_OBSERVATION_ARRAYS, and
@@ -29,7 +29,7 @@ struct HostObservation {
 class HostNetwork {
  public:
   /// Reads the parameters of a policy with `num_cameras` cameras. Throws Error naming the file and the first parameter
-  /// that is missing, of another shape or not finite, or the program that replaces the convolutions.
+  /// that is missing, of another shape or not finite. Throws Error naming the program if one replaces the convolutions.
   HostNetwork(const StoredPolicy& saved, int num_cameras);
   ~HostNetwork();
   HostNetwork(const HostNetwork&) = delete;

@@ -13,11 +13,11 @@ namespace pictura::host {
 
 namespace {
 
-// Computes exp(x) for x <= 0, within 2e-7. The function of common/math.h, whose bits devices share, multiplies by 2^n
-// in a loop; here 2^n is written as an exponent, which vectorises.
+// Computes exp(x) for x <= 0, within 2e-7. The function in common/math.h, whose bits are equal on all devices,
+// multiplies by 2^n in a loop. Here 2^n is written as a float's exponent bits, which compilers vectorise.
 PICTURA_INLINE float exp_of_negative(float x) {
-  x = x < -87.0f ? -87.0f : x;  // NaN stays
-  // The sum's last bits are the whole number; the difference rounds to it.
+  x = x < -87.0f ? -87.0f : x;  // NaN remains NaN
+  // The last bits of the sum are n as a whole number; subtracting kRounder again gives n as a float.
   constexpr float kRounder = 12582912.0f;  // 1.5 * 2^23
   const float shifted = x * 1.44269504f + kRounder, n = shifted - kRounder;
   const float r = (x - n * 0.693359375f) + n * 2.12194440e-4f;
@@ -30,11 +30,11 @@ PICTURA_INLINE float exp_of_negative(float x) {
 }
 
 struct Normal {
-  float cumulative, density;  // without its factor 1 / sqrt(2 pi)
+  float cumulative, density;  // density: without its factor 1 / sqrt(2 pi)
 };
 
-// Standard normal distribution at x, by approximation 7.1.26 of the error function in Abramowitz and Stegun. It is
-// within 1.5e-7, and its exponential is that of the density.
+// Returns the standard normal distribution at x, by approximation 7.1.26 of the error function in Abramowitz and
+// Stegun. Its error is below 1.5e-7, and it contains the exponential that the density needs.
 PICTURA_INLINE Normal normal_at(float x) {
   const float size = x < 0 ? -x : x;
   const float t = 1.0f / (1.0f + 0.3275911f * 0.70710678f * size);
@@ -46,8 +46,8 @@ PICTURA_INLINE Normal normal_at(float x) {
 
 constexpr float kDensityFactor = 0.39894228f;
 
-// Rows of few channels are processed several at a time, since loops over short rows cost more than their work. They are
-// processed as rows of kRowNumbers, the last of which may be shorter.
+// Several rows of few channels are processed as one longer row of kRowNumbers, since the overhead of loops over short
+// rows exceeds their work. The last of the longer rows may be shorter.
 constexpr int64_t kRowNumbers = 64;
 
 int64_t channels_at_once(int64_t channels) {
@@ -226,8 +226,8 @@ namespace {
 
 constexpr int64_t kColors = 3;
 
-// Writes the patches of an image. `planes`: the image's three colors. The compiler knows the loop bounds of patches of
-// kPatch px that lie wholly in the image; 0: of any size.
+// Writes the patches of an image. `planes`: the image's three colors. With kPatch > 0 the compiler knows the loop
+// bounds of patches that lie wholly in the image; 0: patches of any size.
 template <int64_t kPatch>
 void patches_of_image(const uint8_t* planes, int64_t height, int64_t width, [[maybe_unused]] int64_t patch_px,
                       float* out) {
@@ -289,7 +289,7 @@ void largest_members(const float* members, const int32_t* counts, int64_t sets, 
     for (int32_t member = 0; member < count; ++member, members += channels) {
 #pragma omp simd
       for (int64_t c = 0; c < channels; ++c) {
-        // NaN is selected and kept, so that a failing network is noticed.
+        // A NaN is selected and kept as the largest value, so that a failing network is noticed.
         const bool is_larger = (members[c] > largest_out[c]) | (members[c] != members[c]);
         largest_out[c] = is_larger ? members[c] : largest_out[c];
         which_out[c] = is_larger ? member : which_out[c];
@@ -301,7 +301,7 @@ void largest_members(const float* members, const int32_t* counts, int64_t sets, 
 void largest_members_backward(const float* grad, const int32_t* which, int64_t sets, int64_t channels, int64_t hidden,
                               const float* weight, const float* activations, float* activations_grad_inout,
                               float* weight_grad_inout) {
-  // The two matrices are updated in turn, so that one of them is in the first-level cache.
+  // The two matrices are updated one after the other, so that the matrix in use stays in the first-level cache.
   const auto add_all = [&](const auto& add) {
     for (int64_t i = 0; i < sets * channels; ++i) {
       if (which[i] >= 0) add(grad[i], i % channels, int64_t{which[i]});

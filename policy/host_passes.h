@@ -1,5 +1,5 @@
-// Passes of a network on the host over its activations between matrix products: loops over contiguous fp32 rows, in one
-// pass where ATen takes several. Every function runs in one thread on the rows it is given. Callers divide rows among
+// Operations of a network on the host between matrix products: loops over contiguous fp32 rows, in one pass over memory
+// where ATen takes several. Every function runs in one thread on the rows that it is given. Callers divide rows among
 // threads and choose blocks that stay in a core's cache.
 #pragma once
 
@@ -10,12 +10,13 @@
 
 namespace pictura::host {
 
-/// Maximum number of activations in a block, so that the block and its results stay in a core's second-level cache (0.5
-/// MB and more on current processors).
+/// Maximum number of activations in a block, at which the block and its results stay in a core's second-level cache
+/// (0.5 MB and more on current processors).
 constexpr int64_t kBlockNumbers = 48 * 1024;
 
-/// Computes out = GELU(x + bias), by the error function, within 2e-7 of max(1, |x + bias|), and its derivative if
-/// slope_out is not null. x, out, slope_out: [rows, channels]; out or slope_out may be x. bias: [channels].
+/// Computes out = GELU(x + bias), by the error function, with an error of at most 2e-7 max(1, |x + bias|). Also
+/// computes the derivative if slope_out is not null. x, out, slope_out: [rows, channels]; out or slope_out may be x.
+/// bias: [channels].
 void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels, float* out, float* slope_out);
 
 /// Computes the gradient of x, slope * grad_out, and adds the bias gradient to bias_grad_inout, [channels]. grad_x_out
@@ -46,26 +47,27 @@ void fold(const ConvolutionSize& size, const float* taps_grad, int64_t n, float*
 void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t camera, int64_t height, int64_t width,
              int64_t patch_px, float* out);
 
-/// Writes the present members of sets consecutively, set after set, each followed by its features. members: [sets,
+/// Writes the present members of all sets consecutively, each member followed by its features. members: [sets,
 /// max_members, size.columns]; counts: [sets], at most `max_members`. size.keeps_rows must be set; size.rows is not
 /// read. out: [sum of counts, size.width()].
 void member_rows(const float* members, const int32_t* counts, int64_t sets, int64_t max_members, const RowSize& size,
                  float* out);
 
-/// Finds the largest member of each set in each channel, and its index in the set, the first of equal members; 0 and -1
-/// in an empty set. members: [sum of counts, channels], set after set.
+/// Finds the largest value of each channel among the members of each set, and the index in the set of the member with
+/// that value (the first of equal ones). In an empty set the value is 0 and the index -1. members: [sum of counts,
+/// channels], set after set.
 void largest_members(const float* members, const int32_t* counts, int64_t sets, int64_t channels, float* largest_out,
                      int32_t* which_out);
 
-/// Backward pass from the largest embeddings of sets through their linear layer, where each channel's gradient goes to
-/// one member alone. grad: [sets, channels]; which: i32 [sets, channels], the row of the member among `activations`,
-/// [rows, hidden], -1 in an empty set; weight: [channels, hidden]. Adds to activations_grad_inout, [rows, hidden], and
-/// weight_grad_inout, [channels, hidden].
+/// Backward pass from the largest embeddings of sets through the linear layer that computes embeddings. The gradient of
+/// each channel goes to only one member. grad: [sets, channels]; which: i32 [sets, channels], row of that member in
+/// `activations`, [rows, hidden], or -1 in an empty set; weight: [channels, hidden]. Adds to activations_grad_inout,
+/// [rows, hidden], and weight_grad_inout, [channels, hidden].
 void largest_members_backward(const float* grad, const int32_t* which, int64_t sets, int64_t channels, int64_t hidden,
                               const float* weight, const float* activations, float* activations_grad_inout,
                               float* weight_grad_inout);
 
-/// Log-probabilities of actions from their logits, [rows, actions]; `out` may be `logits`.
+/// Computes log-probabilities of actions from their logits, [rows, actions]; `out` may be `logits`.
 void log_softmax(const float* logits, int64_t rows, int64_t actions, float* out);
 
 }  // namespace pictura::host

@@ -1,4 +1,4 @@
-// Registers hold the sums of a few rows and columns; both matrices are read in place.
+// Matrix products in which registers hold the sums of a few rows and columns, and both matrices are read in place.
 #include "pictura/policy/host_product.h"
 
 namespace pictura::host {
@@ -24,7 +24,7 @@ PICTURA_INLINE void some_sums(const ReadMatrix& a, const float* b, int64_t inner
   }
 }
 
-// Computes all rows, columns [0, kVectors * kFloats).
+// Computes columns [0, kVectors * kFloats) of all rows.
 template <int kFloats, int kVectors>
 PICTURA_INLINE void all_rows(const ReadMatrix& a, const float* b, int64_t rows, int64_t inner, int64_t columns,
                              float* out) {

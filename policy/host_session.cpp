@@ -1,4 +1,4 @@
-// Sessions in which the host computes the policy, without torch.
+// Sessions in which the host computes the policy without torch.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -81,7 +81,7 @@ struct HostSession final : SessionParts {
   void decide(const PolicyInput& input, int64_t batch, Span<const int64_t> indices, Renderer* renderer,
               float* logits_out, float* values_out) const {
     if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
-    constexpr int64_t kMostAtOnce = 512;  // agents, whose images take 62 KB each at the paper's size
+    constexpr int64_t kMostAtOnce = 512;  // agents; at the paper's size, the images of each take 62 KB
     const auto total = static_cast<int64_t>(indices.size());
     const int64_t max_members = std::min<int64_t>(config.train.forward_chunk, kMostAtOnce);
     for (int64_t begin = 0; begin < total; begin += max_members) {
@@ -109,7 +109,7 @@ struct HostSession final : SessionParts {
     const auto num_views = static_cast<int64_t>(indices.size());
     const ImageLayout layout = image_layout(rig, num_views, PixelFormat::u8);
     std::vector<uint8_t> pixels(layout.bytes());
-    // Blocks lie one after the other; within a block, the images of an agent are adjacent.
+    // Blocks are stored one after the other; within a block, the images of an agent are adjacent.
     std::vector<uint8_t*> begins;
     uint8_t* next = pixels.data();
     for (const BlockLayout& block : layout.blocks) {
@@ -127,7 +127,7 @@ struct HostSession final : SessionParts {
       places.push_back(i);
     }
     if (views.empty()) return pixels;
-    // Images are drawn without gaps, then moved to their agents from the last to the first.
+    // Images are drawn without gaps, then moved to the places of their agents, the last image first.
     std::vector<CameraImages> cameras;
     std::vector<int64_t> num_placed(layout.blocks.size());
     for (const CameraLayout& camera : layout.cameras) {
@@ -184,7 +184,7 @@ class HostController final : public PolicyController {
   int64_t num_driven() const override { return num_driven_; }
 
  private:
-  // Removes the slots of agents that hold their action. Same rule as DecisionClock::select_deciding().
+  // Removes the slots of agents that hold their action, by the rule of DecisionClock::select_deciding().
   void keep_deciding(const SimulatorArrays& input, std::vector<int64_t>* slots_inout) {
     const int64_t decision_steps = session_.config.policy.decision_steps, step = step_++;
     if (decision_steps == 1) return;
@@ -204,7 +204,7 @@ class HostController final : public PolicyController {
   bool hides_auxiliary_;
   int64_t step_ = 0;              // calls of act()
   std::vector<int32_t> actions_;  // [slots], held until the next decision
-  std::vector<uint8_t> acted_;    // [slots] of the step before
+  std::vector<uint8_t> acted_;    // [slots] at the previous step
   int64_t num_driven_ = 0;
 };
 

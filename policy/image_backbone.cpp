@@ -19,10 +19,10 @@ namespace {
 constexpr const char* kDescription = "pictura_backbone.json";  // entry in the program's file
 constexpr const char* kBackboneFormat = "pictura backbone 1";
 
-// Returns the first line of a torch error, which continues with its own stack.
+// Returns the first line of an error of torch; a stack trace follows it.
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-// Returns the last line of a program's error, which begins with its stack.
+// Returns the last line of a program's error; a stack trace precedes it.
 std::string last_line(std::string text) {
   text.erase(text.find_last_not_of(" \n") + 1);
   return text.substr(text.rfind('\n') + 1);
@@ -34,7 +34,7 @@ struct ImageBackbone::Parts {
   std::string path, hash;
   torch::jit::Module program;
   int64_t patch_px = 0, channels = 0;
-  int64_t width_px = 0, height_px = 0;  // the one size that it supports; 0: any that patches divide
+  int64_t width_px = 0, height_px = 0;  // the only size that the program supports; 0: all multiples of the patch size
   at::ScalarType type = at::kFloat;
   bool frozen = true;
   std::vector<NamedTensor> parameters;
@@ -115,7 +115,8 @@ at::Tensor ImageBackbone::forward(const at::Tensor& images) const {
   const int64_t height = pixels.size(2), width = pixels.size(3), patch = parts_->patch_px;
   const at::Tensor whole =
       at::constant_pad_nd(pixels, {0, parts_->filled_up(width) - width, 0, parts_->filled_up(height) - height});
-  // Torch's optimizer of programs specialises them for the inputs of earlier calls: equal calls would not be equal.
+  // Torch's optimizer of programs specialises a program for the inputs of earlier calls, so that equal calls would give
+  // different bits.
   const torch::jit::GraphOptimizerEnabledGuard no_optimizer(false);
   const bool needs_grad = at::GradMode::is_enabled() && !parts_->frozen;
   const at::AutoGradMode grad(needs_grad);

@@ -1,5 +1,5 @@
-// Pretrained image network in place of the convolutions: a TorchScript program that scripts/export_backbone wrote, with
-// its description.
+// Pretrained image network that replaces the convolutions: a TorchScript program with its description, written by
+// scripts/export_backbone.
 #pragma once
 
 #include <memory>
@@ -23,16 +23,17 @@ class ImageBackbone {
 
   /// Channels of a feature map.
   int64_t channels() const;
-  /// 16 hexadecimal digits over the file's bytes.
+  /// Hash of the file's bytes: 16 hexadecimal digits.
   const std::string& hash() const;
-  /// Trained weights, named "image_backbone." and their name in the program; empty if frozen.
+  /// Trained weights; their names are "image_backbone." followed by the name in the program. Empty if frozen.
   const std::vector<NamedTensor>& parameters() const;
-  /// Throws Error naming file and camera if the program takes images of one size only and this camera has another size.
+  /// Throws Error naming file and camera if the program supports only one image size and a camera of the rig has
+  /// another size.
   void check_images(const Rig& rig) const;
 
-  /// Computes feature maps of images, u8 [views, cameras, 3, height, width]: [cameras * views, channels, rows,
-  /// columns], a row and a column for each patch, channels last in memory. Images that the patches do not divide are
-  /// padded with black at the right and the bottom.
+  /// Computes feature maps, [cameras * views, channels, rows, columns] with channels last in memory, of images, u8
+  /// [views, cameras, 3, height, width]. Each patch of an image has one position of the map. Images whose size is no
+  /// multiple of the patch size are padded with black at the right and the bottom.
   at::Tensor forward(const at::Tensor& images) const;
 
  private:

@@ -36,7 +36,8 @@ ActivationSize size_of(const at::Tensor& x) {
   return {activation_type_of(x.scalar_type()), x.numel() / x.size(-1), x.size(-1)};
 }
 
-/// Creates the passes of a device. Passes hold no state; each call has its own, so that autograd's threads share none.
+/// Creates the passes of a device. Passes hold no state; each call creates its own, so that autograd's threads share no
+/// object.
 std::unique_ptr<NetworkPasses> passes_on(at::Device device) {
   return make_network_passes({MemorySpace::cuda, device.index()});
 }
@@ -139,7 +140,8 @@ RowSize row_size(const at::Tensor& rows, const RowFeatures& features, bool keeps
   return {rows.numel() / rows.size(-1), rows.size(-1), features, keeps_rows};
 }
 
-// Whether the host's own passes (host_passes.h) support x. They are fp32, unlike layers in bf16.
+// Whether the host's passes (host_passes.h) support x. These passes compute in fp32, so they do not support layers in
+// bf16.
 bool is_on_host(const at::Tensor& x) {
   return x.is_cpu() && x.scalar_type() == at::kFloat && !at::autocast::is_autocast_enabled(at::kCPU);
 }
@@ -150,8 +152,8 @@ bool keeps_gradients(std::initializer_list<at::Tensor> inputs) {
          std::any_of(inputs.begin(), inputs.end(), [](const at::Tensor& t) { return t.requires_grad(); });
 }
 
-// Divides [0, count) into blocks of at most `block`, in as many parts as torch has threads. Sums of parts are added in
-// the order of parts, so they depend on the number of threads alone.
+// Divides [0, count) into one part per thread of torch, and each part into blocks of at most `block`. Sums of parts are
+// added in the order of parts, so results depend only on the number of threads, not on timing.
 class Blocks {
  public:
   Blocks(int64_t count, int64_t block)
@@ -185,7 +187,7 @@ class Blocks {
 const float* read(const at::Tensor& t, int64_t row = 0) { return t.const_data_ptr<float>() + row * t.stride(0); }
 float* write(const at::Tensor& t, int64_t row = 0) { return t.mutable_data_ptr<float>() + row * t.stride(0); }
 
-// Sets out, and slope if it is defined, see host::bias_gelu(). All are [..., channels] and contiguous.
+// Sets `out`, and `slope` if it is defined, by host::bias_gelu(). All tensors are [..., channels] and contiguous.
 void add_bias_gelu(const at::Tensor& x, const at::Tensor& bias, const at::Tensor& out, const at::Tensor& slope) {
   const int64_t channels = bias.size(0), rows = x.numel() / channels;
   const float* const from = read(x);
@@ -316,7 +318,7 @@ struct HostDirectConvolution : Function<HostDirectConvolution> {
 // Convolution as matrix products of the outputs' taps with the weights, one block of images at a time. For few channels
 // its backward pass is two to four times as fast as oneDNN's.
 struct HostConvolution : Function<HostConvolution> {
-  /// With fewer outputs, the products leave most of a vector unit idle.
+  /// With fewer outputs than this, products leave most of a vector unit idle.
   static constexpr int64_t kMinOutputs = 16;
 
   HostConvolution(const at::Tensor& x, const at::Tensor& w, int64_t stride)
@@ -400,12 +402,12 @@ struct HostConvolution : Function<HostConvolution> {
   }
 };
 
-// Largest embeddings of sets, computed in blocks of sets. Each member passes through a layer with GELU, normalized
-// before the GELU or not, and a layer without. Each channel's gradient goes to its largest member alone, so the
-// backward pass reads only the largest members: a few per set.
+// Largest embeddings of sets, computed in blocks of sets. Each member passes through a layer with GELU, with or without
+// a norm before it, and a layer without GELU. Each channel's gradient goes only to its largest member, so the backward
+// pass reads only a few members per set.
 struct HostSets : Function<HostSets> {
-  /// Returns {the largest, [sets, channels]; the present members with their features, [all, width]; the index in its
-  /// set of the largest member, i32 [sets, channels]}.
+  /// Returns three tensors: largest embeddings, [sets, channels]; present members with their features, [all, width];
+  /// indices of the largest members in their sets, i32 [sets, channels].
   static variable_list compute(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
                                bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
                                const at::Tensor& weight, const at::Tensor& bias) {
@@ -462,14 +464,15 @@ struct HostSets : Function<HostSets> {
     const auto options = weight.options();
     const at::Tensor hidden_weight_sums = at::zeros({blocks.parts(), hidden, rows.size(1)}, options),
                      hidden_bias_sums = at::zeros({blocks.parts(), hidden}, options),
-                     gelu_bias_sums = at::zeros({blocks.parts(), hidden}, options),  // zeros, without gradients
+                     gelu_bias_sums = at::zeros({blocks.parts(), hidden}, options),  // with a norm, discarded
         weight_sums = at::zeros({blocks.parts(), channels, hidden}, options);
     const at::Tensor hidden_transposed = hidden_weight.t(), gelu_bias = gelu_bias_of(hidden_bias, has_norm);
     blocks.run([&](int64_t part) {
       return [&, part, numbers = std::vector<int32_t>(), places = std::vector<int32_t>(),
               chosen = std::vector<int64_t>(),
               hidden_weight_sum = hidden_weight_sums[part]](int64_t begin, int64_t end) mutable {
-        // Members that are the largest in some channel, and each channel's index among these members.
+        // Members that are the largest in at least one channel, and the index of each channel's largest member among
+        // them.
         chosen.clear();
         places.clear();
         const int32_t* its_which = which.const_data_ptr<int32_t>() + begin * channels;
@@ -544,8 +547,8 @@ bool is_bf16_on_device(const at::Tensor& x) {
          at::autocast::get_autocast_dtype(at::kCUDA) == at::kBFloat16;
 }
 
-// Largest embeddings of sets on a device, in one pass each way; see HostSets. The backward pass recomputes what it
-// needs of the members that are the largest in some channel.
+// Largest embeddings of sets on a device, with one pass forward and one backward; see HostSets. The backward pass
+// recomputes the activations of those members that are the largest in at least one channel.
 struct DeviceSets : Function<DeviceSets> {
   /// Computes the largest embeddings. Sets the index of the largest member, u8 [sets, channels], if `which_out` is not
   /// null.
@@ -568,7 +571,7 @@ struct DeviceSets : Function<DeviceSets> {
                             const at::Tensor& weight, const at::Tensor& bias) {
     at::Tensor which;
     const at::Tensor out = compute(members, counts, size, hidden_weight, hidden_bias, weight, bias, &which);
-    // A context holds tensors only, so the size is stored as bytes.
+    // An autograd context can only store tensors, so the size is stored as bytes.
     const at::Tensor size_bytes = at::empty({sizeof(SetSize)}, at::kByte);
     std::memcpy(size_bytes.mutable_data_ptr(), &size, sizeof(SetSize));
     context->save_for_backward({members, which, hidden_weight, hidden_bias, weight, bias, size_bytes});
@@ -643,7 +646,8 @@ at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::
 }
 
 at::Tensor normalize(const at::Tensor& x) {
-  // Autocast would convert to fp32 and back, two more passes each way. Sums are fp32 without autocast, too.
+  // Autocast would convert to fp32 and back, which takes two more passes forward and two backward. Sums are in fp32
+  // without autocast, too.
   const c10::impl::ExcludeDispatchKeyGuard no_autocast(c10::autocast_dispatch_keyset);
   return at::layer_norm(x, {x.size(-1)});
 }

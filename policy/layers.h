@@ -1,6 +1,6 @@
 // Layers of the policies, each with the operations that follow it. On a CUDA device these operations are one pass over
-// memory (rules/network_passes.h) where the sizes allow it. On the host in fp32 they run in blocks that stay in a
-// core's cache (host_passes.h). Elsewhere ATen computes them. All layers are differentiable.
+// memory (rules/network_passes.h) if the sizes allow it. On the host in fp32 they run in blocks that stay in a core's
+// cache (host_passes.h). In all other cases ATen computes them. All layers are differentiable.
 #pragma once
 
 #include <ATen/ATen.h>
@@ -12,14 +12,14 @@ namespace pictura {
 /// GELU of a linear layer. x: [..., in]; weight: [out, in]; bias: [out].
 at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias);
 
-/// Layer norm without parameters over the last dimension, in the type of x at any precision.
+/// Layer norm without parameters over the last dimension. The result has the type of x at every precision.
 at::Tensor normalize(const at::Tensor& x);
 
 /// GELU of a linear layer whose outputs are normalized before the GELU. Shapes as in linear_gelu().
 at::Tensor linear_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias);
 
 /// GELU of a convolution whose input is padded by half the kernel. x: [n, in, height, width]; weight: [out, in, kernel,
-/// kernel], or with fewer inputs where the last channels of x are 0; bias: [out].
+/// kernel], where `in` may be smaller than that of x if the last channels of x are 0; bias: [out].
 at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride);
 
 /// Layer norm of x + position over the last dimension. x: [..., period, channels]; position: [period, channels], or
@@ -30,9 +30,10 @@ at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tenso
 /// layers of the sizes in SetSize.
 bool has_fused_set_encoder(const at::Tensor& members, const RowFeatures& features, const at::Tensor& hidden_weight,
                            const at::Tensor& weight);
-/// Largest value of each channel over the members of a set: [sets, channels], 0 for an empty set. Each member passes
-/// through a linear layer with GELU (linear_norm_gelu() if `has_norm`) and a second linear layer. members: [sets,
-/// maximum, columns], without gradient, each followed by its features; counts: i32 [sets], the members of each set.
+/// Returns the largest value of each channel over the embeddings of a set's members: [sets, channels], 0 for an empty
+/// set. A member's embedding is computed from the member and its features by a linear layer with GELU
+/// (linear_norm_gelu() if `has_norm`) and a second linear layer. members: [sets, maximum, columns], without gradient;
+/// counts: i32 [sets], number of members of each set.
 at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
                              bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
                              const at::Tensor& weight, const at::Tensor& bias);
@@ -40,14 +41,16 @@ at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts
 /// Softmax over tokens. scores: [matrices, tokens, columns].
 at::Tensor token_softmax(const at::Tensor& scores);
 
-/// Whether feature_rows() supports these rows, [..., columns]: f32 on a CUDA device, with few enough numbers in a row.
+/// Whether feature_rows() supports these rows, [..., columns]: they must be f32, on a CUDA device, and not too wide
+/// (RowSize::kMaxWidth).
 bool has_fused_row_features(const at::Tensor& rows, const RowFeatures& features);
 /// Features of rows, [..., columns], as RowSize describes them, in `type`. Without gradient.
 at::Tensor feature_rows(const at::Tensor& rows, const RowFeatures& features, bool keeps_rows, at::ScalarType type);
 
-/// Patches of images, u8 [views, cameras, 3, height, width], as pixels of [cameras * views, channels, height /
-/// patch_px, width / patch_px] of `type`, padded with black, channels last in memory. Channel (c * patch_px + y) *
-/// patch_px + x is color c, 0 to 255, of pixel (x, y) of the patch; further channels are 0. Without gradient.
+/// Converts images, u8 [views, cameras, 3, height, width], to patches: [cameras * views, channels, height / patch_px,
+/// width / patch_px] of `type`, with channels last in memory. Images are padded with black to whole patches. Color c, 0
+/// to 255, of pixel (x, y) of a patch becomes channel (c * patch_px + y) * patch_px + x; further channels are 0.
+/// Without gradient.
 at::Tensor image_patches(const at::Tensor& images, int64_t patch_px, at::ScalarType type);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Device of a network, and arrays in its memory. Without torch headers: torch_device.cpp implements these functions
-// with torch, host_device.cpp for builds without torch, which compute on the host.
+// Device of a network, and arrays in its memory. Has no torch headers: torch_device.cpp implements these functions with
+// torch, and host_device.cpp for builds without torch, which compute on the host.
 #pragma once
 
 #include <memory>
@@ -11,10 +11,10 @@
 
 namespace pictura {
 
-/// Device on which this configuration learns, in the process with this local rank. If the configuration leaves the
-/// device open and there are several, the rank selects it. Opens torch's CUDA library for a CUDA device. Throws Error
-/// naming the key and the reason if the configuration cannot learn there, or if the simulator or the renderer uses
-/// other memory.
+/// Returns the device on which this configuration learns, in the process with this local rank. If the configuration
+/// does not specify one of several devices, the rank selects it. Opens torch's CUDA library for a CUDA device. Throws
+/// Error naming the key and the reason if the configuration cannot learn there, or if the simulator or the renderer
+/// uses other memory.
 Device open_learning_device(const Config& config, int local_rank = 0);
 
 /// Torch's current stream of a device, on which the network computes; null on the host. Autograd enqueues the backward
@@ -24,8 +24,8 @@ Stream current_stream(Device device);
 /// Returns uninitialised memory of a device, which is freed with the pointer.
 std::shared_ptr<std::byte> allocate_bytes(size_t bytes, Device device);
 void set_to_zero(std::byte* memory, size_t bytes, Device device);
-/// Copies on the current stream. Returns when a copy to the host is complete, and when host memory that it reads may be
-/// freed.
+/// Copies on the current stream. A copy to the host is complete on return; a copy from the host has read its source,
+/// which may then be freed.
 void copy_bytes(std::byte* to, Device to_device, const std::byte* from, Device from_device, size_t bytes);
 
 /// Array in the memory of a device.

@@ -1,4 +1,4 @@
-// Sizes that the policy's layers share with the estimate of their memory.
+// Sizes that both the policy's layers and the estimate of their memory need.
 #pragma once
 
 #include <string_view>
@@ -22,8 +22,8 @@ inline RowFeatures row_features_of(const PolicySection& policy, std::string_view
           .position_unit_m = kScalePosition_m};
 }
 
-/// Number of sines and cosines of a pixel's position in the image, which tell attention where a token is at any image
-/// size.
+/// Number of sines and cosines of a token's position in the image. They give attention the position independently of
+/// the image size.
 constexpr int kPositionFeatures = 8;
 
 }  // namespace pictura

@@ -85,7 +85,7 @@ std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> bat
 
 namespace {
 
-// Allocates patches of images, camera after camera.
+// Allocates memory for patches of images, stored camera after camera.
 std::vector<ImageBlock> allocate_patches(const ImageLayout& layout, Device device) {
   std::vector<ImageBlock> blocks;
   for (const BlockLayout& block : layout.blocks) {
@@ -110,7 +110,7 @@ std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> vi
   const ImageLayout layout = image_layout(rig, num_views, format, order, as_patches ? patch_px : kDefaultPatch_px);
   std::vector<ImageBlock> blocks =
       as_patches ? allocate_patches(layout, renderer->device()) : allocate_images(rig, {num_views}, renderer->device());
-  // Each block is a separate tensor; its strides give the start of an image of a view and a camera.
+  // Each block is a separate tensor, whose strides give the start of the image of a view and a camera.
   std::vector<CameraImages> cameras;
   std::vector<int64_t> num_placed(blocks.size());
   for (const CameraLayout& camera : layout.cameras) {

@@ -14,11 +14,11 @@
 
 namespace pictura {
 
-/// Images of the cameras that share one size: u8 [batch, cameras of this size, 3, height, width], or bf16 [batch,
-/// cameras, rows, columns, values of a patch], the patches of common/patches.h, stored as [cameras, batch, ...].
+/// Images of the cameras that share one size: planar u8 [batch, cameras of this size, 3, height, width], or patches
+/// (common/patches.h) as bf16 [batch, cameras, rows, columns, values of a patch], stored as [cameras, batch, ...].
 struct ImageBlock {
   at::Tensor pixels;
-  std::vector<int64_t> cameras;  // their indices in the rig
+  std::vector<int64_t> cameras;  // indices of these cameras in the rig
 };
 
 /// Observations of a batch of agents: the arrays of simulator/observation.h by name, and images. Tensors that the
@@ -64,11 +64,11 @@ static_assert(entity_set_of(std::size(kObservationArrays)) == kNumEntitySets, "t
 /// Uninitialised storage for the arrays that this configuration's policy reads, [rows, slots, ...].
 Observation allocate_observations(const Config& config, int64_t rows, int64_t slots, Device device);
 
-/// Returns one row of storage whose tensors are [rows, ...].
+/// Returns one row of observations whose tensors are [rows, ...].
 Observation row_of(const Observation& rows, int64_t row);
 
 /// Copies arrays in the memory of `device` to the defined tensors of `out`, [slots, ...], in the same memory. Throws
-/// Error naming an array of another size.
+/// Error naming an array whose size differs from that of its tensor.
 void copy_arrays(const ObservationView& view, Device device, const Observation& out);
 
 /// Selects agents from the arrays that this configuration's policy reads, in the memory of `device`. indices: i64 [n],
@@ -81,14 +81,14 @@ void hide_auxiliary(Observation* observation_inout);
 /// Allocates uninitialised memory for images of a rig, [batch..., cameras of one size, 3, height, width].
 std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> batch, Device device);
 
-/// Draws the images of these views, [views, ...], in the renderer's memory: as patches of `patch_px` if it is not 0 and
-/// the renderer supports them, else planar.
+/// Draws the images of these views, [views, ...], in the renderer's memory: as patches if `patch_px` is not 0 and the
+/// renderer supports them, else planar.
 std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> views, Renderer* renderer,
                                     int patch_px = 0);
 
 /// Returns the slots, i64 [n] in ascending order, of active agents that the mask [slots] selects (empty: all). With
-/// `with_left` also the slots of agents that left a road that ends in the last step, since their last observation has a
-/// value.
+/// `with_left` it includes agents that in the last step left a road that ends, since the value of their last
+/// observation is needed.
 at::Tensor active_slots(const SimulatorArrays& input, Span<const uint8_t> mask, bool with_left,
                         PolicyExecutor* executor);
 

@@ -56,7 +56,7 @@ class ParameterMaker {
 
   /// Type and device of all parameters.
   const at::TensorOptions& options() const { return options_; }
-  /// Adds parameters that are not drawn.
+  /// Adds parameters that are not drawn, for instance those of a program.
   void add_parameters(const std::vector<NamedTensor>& parameters) {
     parameters_->insert(parameters_->end(), parameters.begin(), parameters.end());
   }
@@ -142,7 +142,7 @@ class VectorEncoder final : public SceneEncoder {
   struct Group {
     PolicyNetwork::GroupEncoder encoder;
     at::Tensor Observation::* members;
-    int64_t set;  // column in set_counts
+    int64_t set;  // column of set_counts
     RowFeatures features;
   };
   int64_t embedding_width_;
@@ -271,9 +271,9 @@ class PerspectiveEncoder final : public SceneEncoder {
 
   // Computes attention of each camera's queries [cameras, queries, width] over the tokens of its images [cameras *
   // batch, tokens, width]; returns [cameras * batch, queries, width]. Queries are parameters, equal for all images, so
-  // keys and values need not be computed for each token. Scores are computed directly from tokens, q (W t) = (q W) t;
-  // values and output are one product with the weighted sums of tokens. A key bias would add the same number to all
-  // scores of a query, which softmax ignores. The value bias is in the sum once, since weights add up to 1.
+  // keys and values need not be computed for each token. Scores are computed directly from tokens by q (W t) = (q W) t.
+  // The value and output layers are one product with the weighted sums of tokens. A key bias would add the same number
+  // to all scores of a query, which softmax ignores. The value bias is added once, since attention weights sum to 1.
   at::Tensor attend(const at::Tensor& queries, const at::Tensor& tokens) const {
     const int64_t cameras = queries.size(0), heads = config_.attention_heads, head_width = width_ / heads;
     const at::Tensor key = key_.unflatten(0, {heads, head_width});
@@ -292,7 +292,7 @@ class PerspectiveEncoder final : public SceneEncoder {
   const PolicySection config_;
   const int num_cameras_;
   const at::ScalarType image_type_;
-  const std::unique_ptr<ImageBackbone> backbone_;  // null: the convolutions
+  const std::unique_ptr<ImageBackbone> backbone_;  // null: the convolutions are used
   const int64_t width_;
   std::vector<PolicyNetwork::Linear> convolutions_;  // weights are [out, in, kernel, kernel]
   at::Tensor queries_, key_;
@@ -329,7 +329,7 @@ PolicyNetwork::PolicyNetwork(const PolicySection& config, int num_cameras, uint6
 
 at::Tensor PolicyNetwork::run_trunk(at::Tensor x) const {
   for (size_t i = 0; i < backbone_.size(); ++i) {
-    // The first layer has an input of another width, which comes from the encoders.
+    // The first layer has another input width, that of the encoders' concatenated outputs.
     const bool is_first = i == 0;
     const at::Tensor y = apply_gelu(backbone_[i], layer_norm_ && !is_first ? normalize(x) : x);
     x = residual_ && !is_first ? x + y : y;

@@ -1,6 +1,6 @@
-// The paper's two policies (appendix, table of the policy architecture): a trunk with actor and critic. Its input comes
-// from encoders of four entity sets (five with walls), or from an image branch whose output is as wide as that of four
-// encoders. Plain tensors and functions, no torch modules.
+// The paper's two policies (appendix, table of the policy architecture). Both have the same trunk with actor and
+// critic. Before the trunk, the vector policy has encoders of four entity sets (five with walls), and the image policy
+// has one image branch as wide as the four encoders. Plain tensors and functions, no torch modules.
 #pragma once
 
 #include <functional>
@@ -35,7 +35,7 @@ class SceneEncoder {
   virtual at::Tensor forward(const Observation& observation) const = 0;
   /// Width of the embedding.
   virtual int64_t width() const = 0;
-  /// Program in place of the convolutions, or null.
+  /// Program that replaces the convolutions, or null.
   virtual const ImageBackbone* image_backbone() const { return nullptr; }
   /// See Policy::drawn_patch_px.
   virtual int drawn_patch_px() const { return 0; }
@@ -74,9 +74,9 @@ class Policy {
 /// The paper's actor-critic network.
 class PolicyNetwork final : public Policy {
  public:
-  /// Draws parameters from (seed, index of the parameter, index of the element) alone, except those of a program
-  /// (policy.backbone), which start from its file. With `reads_walls` the vector policy has a fifth set. The host
-  /// supports bf16, slowly, but not tf32, which it computes in fp32.
+  /// Draws parameters, each keyed only by (seed, index of the parameter, index of the element). Parameters of a program
+  /// (policy.backbone) start from the program's file instead. With `reads_walls` the vector policy has a fifth set. The
+  /// host supports bf16, slowly; for tf32 it computes in fp32.
   PolicyNetwork(const PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
                 bool reads_walls = false, Device device = {}, Precision precision = Precision::fp32);
 
@@ -102,7 +102,7 @@ class PolicyNetwork final : public Policy {
   at::Tensor run_trunk(at::Tensor x) const;
 
   GroupEncoder ego_, conditioning_;
-  bool layer_norm_, residual_;  // options of the trunk
+  bool layer_norm_, residual_;  // options of the trunk's layers
   std::vector<Linear> backbone_;
   Linear actor_, critic_;
 
@@ -115,14 +115,14 @@ class PolicyNetwork final : public Policy {
 /// file if the program of policy.backbone cannot be used.
 std::unique_ptr<const Policy> make_policy(const Config& config, const Rig& rig, Device device);
 
-/// Multiplies the logits by a factor, by scaling the parameters of their layer.
+/// Multiplies the policy's logits by a factor, by scaling the parameters of the layer that computes them.
 void scale_logits(const Policy& policy, double factor);
 
 /// Policy outputs for a whole batch without gradients: logits and log-probabilities [batch, actions], values [batch].
 struct Decision {
   at::Tensor logits, log_probs, value;
 
-  /// Whether all logits and values are finite: a bool tensor in their memory.
+  /// Returns whether all logits and values are finite, as a bool tensor in their memory.
   at::Tensor are_finite() const;
   /// Whether all logits and values are finite. Waits for the device.
   bool is_finite() const { return are_finite().item<bool>(); }
@@ -132,8 +132,8 @@ struct Decision {
 Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
                 const std::function<Policy::Output(const at::Tensor& rows)>& act);
 
-/// Largest value over the members of each set, [batch, members, width] -> [batch, width]; members at and beyond
-/// counts [batch] are padding; an empty set gives zeros.
+/// Returns the largest value of each channel over the members of each set: [batch, members, width] -> [batch, width].
+/// Members from index counts[i] on are padding; counts: [batch]. An empty set gives zeros.
 at::Tensor masked_max(const at::Tensor& members, const at::Tensor& counts);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Description of a policy in the headers of checkpoints and safetensors, in JSON. Only for the files that read and
-// write these formats.
+// Description of a policy in the headers of checkpoints and safetensors, in JSON. Only code that reads and writes these
+// formats should include this header.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@
 
 namespace pictura {
 
-/// Shapes of the policy's input and output arrays, which define what its numbers mean. A policy cannot drive if they
-/// differ.
+/// Returns the observation schema: shapes of the policy's input and output arrays, which define the meaning of its
+/// numbers. A policy cannot drive if its schema differs from the current one.
 nlohmann::ordered_json schema_to_json(const Config& config);
 /// Throws Error naming the file and the entry in which the saved schema differs from the current schema of `config`.
 void check_schema(const nlohmann::ordered_json& saved, const Config& config, const std::string& path);

@@ -10,10 +10,12 @@ namespace pictura {
 void set_float32_products(Precision precision) {
   at::Context& context = at::globalContext();
   const bool is_tf32 = precision == Precision::tf32;
-  // Torch's older switches must agree with the newer ones, or reading them throws, as in torch's exporter to ONNX.
+  // Torch's older switches must agree with its newer ones; otherwise reading the older ones throws, for instance in
+  // torch's exporter to ONNX.
   context.setAllowTF32CuDNN(is_tf32);
   context.setAllowTF32CuBLAS(is_tf32);
-  // Set per operation: the setting for all operations does not change convolutions, which use TF32 by default.
+  // The precision is set for each operation, since the setting for all operations does not change convolutions, which
+  // use TF32 by default.
   for (const at::Float32Op operation : {at::Float32Op::CONV, at::Float32Op::RNN, at::Float32Op::MATMUL}) {
     context.setFloat32Precision(at::Float32Backend::CUDA, operation,
                                 is_tf32 ? at::Float32Precision::TF32 : at::Float32Precision::IEEE);

@@ -13,12 +13,13 @@ void set_float32_products(Precision precision);
 
 /// Sets, for the whole process, whether torch computes the same bits in every run: deterministic algorithms, including
 /// cuDNN's, and a workspace that makes cuBLAS reproducible. Torch and cuBLAS read the workspace from the environment
-/// variable CUBLAS_WORKSPACE_CONFIG at their first product on a device, so call this function before that product.
-/// Throws Error if that variable has another value.
+/// variable CUBLAS_WORKSPACE_CONFIG at their first product on a device, so this function must be called earlier. Throws
+/// Error if that variable has another value.
 void set_reproducible(bool reproducible);
 
 /// Scope in which cuDNN times its algorithms for every new size and selects the fastest (its autotuner), unless torch
-/// is set to be reproducible. For updates only: in rollouts the size changes with the number of active agents.
+/// is set to be reproducible. Use it only for updates, since rollouts have a new size for every number of active
+/// agents.
 class Autotuner {
  public:
   Autotuner();
@@ -27,7 +28,7 @@ class Autotuner {
   Autotuner& operator=(const Autotuner&) = delete;
 };
 
-/// Scope in which layers compute in bf16 if that is the precision; other precisions change nothing.
+/// Scope in which layers compute in bf16 if `precision` is bf16; has no effect at other precisions.
 class LayerPrecision {
  public:
   LayerPrecision(Precision precision, at::DeviceType device) : is_bf16_(precision == Precision::bf16), device_(device) {

@@ -6,7 +6,7 @@ namespace pictura {
 
 namespace {
 
-// Converts pairs of metres [..., 2] to four numbers that resolve near and far positions.
+// Converts pairs of metres [..., 2] to four numbers, two of which resolve near positions and two far positions.
 at::Tensor near_and_far(const at::Tensor& pairs_m) {
   const at::Tensor size_m = pairs_m.abs();
   return at::cat({pairs_m / (size_m + double{kNearPoint_m}), pairs_m / (size_m + double{kFarPoint_m})}, -1);

@@ -1,4 +1,4 @@
-// Policy in a file (policy/stored_policy.h) with its weights as torch's tensors.
+// Policy in a file (policy/stored_policy.h), with weights as tensors of torch.
 #pragma once
 
 #include "pictura/policy/policy.h"
@@ -10,7 +10,7 @@ struct SavedPolicy : PolicyFacts {
   std::vector<NamedTensor> parameters;
 };
 
-/// Copy stored tensors to torch's tensors in fp32 on the host, and back from any device.
+/// Copy stored tensors to torch tensors in fp32 on the host, and torch tensors on any device to stored tensors.
 std::vector<NamedTensor> to_tensors(const std::vector<StoredTensor>& stored);
 std::vector<StoredTensor> to_stored(const std::vector<NamedTensor>& tensors);
 

@@ -39,7 +39,7 @@ Config with_session_options(const Config& trained, const SessionOptions& options
     if (!samples) fail_usage("samples: expected {}, got '{}'", kPixelSamplesExpected, options.samples);
     config.render.samples = *samples;
   } else if (!renderer.starts_with("gl")) {
-    config.render.samples = {};  // exact coverage
+    config.render.samples = {};  // without samples: exact coverage
   }
   return config;
 }

@@ -15,20 +15,20 @@ namespace pictura {
 struct SessionOptions {
   int num_threads = 0;            // threads of torch and renderers; 0: all
   std::string device = "auto";    // as run.device of a configuration
-  std::string simulator = "cpu";  // as simulator.backend; for the simulators that it drives in
+  std::string simulator = "cpu";  // as simulator.backend; for the simulators in which the policy drives
   std::string renderer, samples;  // as render.backend and render.samples; empty: as in training
-  // Cameras that replace those of training, in the same number: a rig file, or the paper's cameras at another size (0:
-  // as trained).
+  // Cameras that replace the same number of cameras of training: those of a rig file, or the paper's cameras at another
+  // size (0: as in training).
   std::string rig;
   int width_px = 0, height_px = 0;
-  std::string backbone;  // path of the program of policy.backbone; empty: the path in its configuration
+  std::string backbone;  // path of the program of policy.backbone; empty: the path in the policy's configuration
   // Values that replace those of the policy's [evaluate.conditioning]: "name=value".
   std::vector<std::string> conditioning;
-  bool adds_walls = false;     // adds walls to its worlds, even if it was trained without them
-  bool average = false;        // drives with the weight average that a checkpoint holds
-  double camera_severity = 0;  // factor of kFullCameraSeverity by which its cameras are randomized
+  bool adds_walls = false;     // adds walls to the policy's worlds, even if it was trained without walls
+  bool average = false;        // uses the average of weights that a checkpoint may hold
+  double camera_severity = 0;  // factor of kFullCameraSeverity by which cameras are randomized
   int decision_steps = 0;      // steps for which an action is held; 0: as in training (policy.decision_steps)
-  // Lights of its worlds; without a value those of the policy's training.
+  // Lights of the policy's worlds; without a value as in training.
   std::optional<LightCycles> light_cycles;
   std::optional<LightHeads> light_heads;
 };
@@ -51,7 +51,7 @@ void visit_options(SessionOptions& options, Visitor&& v) {
   v.value({"camera_severity"}, options.camera_severity);
 }
 
-/// Visits the options of lights, which worlds of recorded scenes do not have.
+/// Visits the options of lights; worlds of recorded scenes lack these options.
 template <typename Visitor>
 void visit_light_options(SessionOptions& options, Visitor&& v) {
   v.choice({"light_cycles"}, options.light_cycles, {kLightCyclesNames, std::size(kLightCyclesNames)});

@@ -17,7 +17,7 @@ struct SessionParts {
   SessionParts(const SessionParts&) = delete;
   SessionParts& operator=(const SessionParts&) = delete;
 
-  /// Implement the functions of PolicySession.
+  /// These functions implement the functions of the same names in PolicySession.
   virtual std::string policy_hash() const = 0;
   virtual std::unique_ptr<SessionParts> make_untrained(uint64_t seed) const = 0;
   virtual void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out,
@@ -37,12 +37,12 @@ struct SessionParts {
   void check_outputs(bool are_finite) const;
 };
 
-/// Returns the rig of the options, else the rig of training. No weight depends on sizes or poses. Throws as
-/// PolicySession does.
+/// Returns the rig of the options, else the rig of training. Both are possible, since no weight depends on sizes or
+/// poses of cameras. Throws as PolicySession does.
 Rig chosen_rig(const PolicyFacts& saved, const SessionOptions& options);
 
-/// Open a session computed by torch, or by the host (policy/host_network.h). open_host_session throws Error if the
-/// options name another device, or if a program replaces the convolutions.
+/// Open a session in which torch, or the host without torch (policy/host_network.h), computes the policy.
+/// open_host_session() throws Error if the options specify another device, or if a program replaces the convolutions.
 std::unique_ptr<SessionParts> open_torch_session(const std::string& path, const SessionOptions& options);
 std::unique_ptr<SessionParts> open_host_session(const std::string& path, const SessionOptions& options);
 

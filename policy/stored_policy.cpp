@@ -42,8 +42,8 @@ SafeTensor safe_tensor(const StoredTensor& tensor, WeightType weights) {
   return result;
 }
 
-// Returns the hash of the whole file with zeros for the digits of `hash`, which its metadata hold; empty if the
-// metadata do not hold that hash.
+// Returns the hash of the whole file, in which the digits of `hash` in the metadata are replaced by zeros; empty if the
+// metadata do not contain `hash`.
 std::string hash_of_file(std::string file, const std::string& hash) {
   const std::string key = R"("hash":")";
   const size_t place = file.find(key + hash);

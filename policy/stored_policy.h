@@ -1,5 +1,5 @@
-// Policy in a file: its weights and everything it needs to drive, without the state of its run. Read from a checkpoint
-// or from safetensors (policy/safetensors.h). Without torch.
+// Policy in a file: its weights and all other data that it needs to drive, without the state of its run. Read from a
+// checkpoint or from safetensors (policy/safetensors.h). Has no torch headers.
 #pragma once
 
 #include <cstdint>
@@ -25,10 +25,10 @@ struct PolicyFacts {
   std::string path;  // source file, for messages
   Config config;
   Rig rig;
-  std::string backbone_hash;  // Policy::backbone_hash; no file of ours contains the program itself
-  int64_t update = 0;         // completed updates of its run
+  std::string backbone_hash;  // Policy::backbone_hash; policy files do not contain the program itself
+  int64_t update = 0;         // completed updates of the policy's run
   int64_t agent_steps = 0;
-  /// Learning-rate factors by parameter, where they are not 1: see Optimizer::rate_factors.
+  /// Learning-rate factors other than 1, by parameter: see Optimizer::rate_factors.
   std::map<std::string, double> rate_factors;
 };
 
@@ -37,8 +37,8 @@ struct StoredPolicy : PolicyFacts {
 };
 
 /// Reads the policy of a checkpoint, or of safetensors that write_stored_policy() wrote. With `average` it reads the
-/// average of weights, which a checkpoint may hold. Throws Error naming the file if it is neither, truncated, damaged,
-/// of another observation schema (naming the entry that differs), or holds no average where one is requested.
+/// average of weights, which a checkpoint may hold. Throws Error naming the file if it is neither, truncated or
+/// damaged, if it has another observation schema (naming the entry that differs), or if it lacks a requested average.
 StoredPolicy read_stored_policy(const std::string& path, bool average = false);
 /// Returns the bytes of a policy file.
 std::string read_policy_file(const std::string& path);

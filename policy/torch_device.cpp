@@ -31,7 +31,7 @@ std::string cuda_rejection_reason() {
 Device open_learning_device(const Config& config, int local_rank) {
   const std::string &wanted = config.run.device, &simulator = config.simulator.backend,
                     &renderer = config.render.backend;
-  // Called before anything is computed, even on the host: torch looks for its CUDA library once, and a process that
+  // This must precede all computation, even on the host. Torch looks for its CUDA library only once, and a process that
   // learns on the host may use a device later.
   const std::string why_not = cuda_rejection_reason();
   const bool draws_on_host =
@@ -54,7 +54,7 @@ Device open_learning_device(const Config& config, int local_rank) {
   PICTURA_CHECK(why_not.empty(), "{}: {}", wanted == "auto" ? "simulator.backend: \"cuda\"" : "run.device: " + wanted,
                 why_not);
   const int count = at::detail::getCUDAHooks().deviceCount();
-  // A launcher may expose a single device to each process.
+  // A launcher may expose only a single device to each process, which then has index 0 at every rank.
   Device device{MemorySpace::cuda, count == 1 ? 0 : local_rank};
   if (const size_t colon = wanted.find(':'); colon != std::string::npos) {
     device.index = std::stoi(wanted.substr(colon + 1));
@@ -128,7 +128,7 @@ std::shared_ptr<std::byte> allocate_bytes(size_t bytes, Device device) {
   const at::Tensor memory =
       at::empty({static_cast<int64_t>(bytes)}, at::TensorOptions(at::kByte).device(torch_device(device)));
   auto* const data = reinterpret_cast<std::byte*>(memory.data_ptr<uint8_t>());
-  return {data, [memory](std::byte*) {}};  // it lives as long as this function
+  return {data, [memory](std::byte*) {}};  // the pointer's deleter keeps the memory alive
 }
 
 void set_to_zero(std::byte* memory, size_t bytes, Device device) { bytes_over(memory, bytes, device).zero_(); }
@@ -146,7 +146,7 @@ void OwnStream::run(const std::function<void()>& work) const {
   try {
     work();
   } catch (...) {
-    stream_.synchronize();  // completes the tensors for code that catches the exception
+    stream_.synchronize();  // the work on tensors completes before code that catches the exception reads them
     throw;
   }
   stream_.synchronize();

@@ -1,6 +1,6 @@
-// Device of the network, and pictura's memory as torch tensors. Work is enqueued on torch's current stream: by default
-// CUDA's legacy stream, a null Stream. CUDA graphs cannot capture that stream, so updates with graphs use a stream of
-// their own.
+// Device of the network, and access to pictura's memory as torch tensors. Work is enqueued on torch's current stream.
+// By default this is CUDA's legacy stream, a null Stream. CUDA graphs cannot capture the legacy stream, so updates with
+// graphs use an OwnStream.
 #pragma once
 
 #include <functional>
@@ -13,12 +13,12 @@ namespace pictura {
 
 at::Device torch_device(Device device);
 
-/// Stream of a device that waits for no other stream.
+/// Stream of a device that does not wait for other streams implicitly.
 class OwnStream {
  public:
   explicit OwnStream(Device device);
-  /// Runs `work` with this stream as torch's current stream, after all work on the previous current stream, and waits
-  /// for it.
+  /// Runs `work` with this stream as torch's current stream, after all work on the stream that was current before, and
+  /// waits until the work is complete.
   void run(const std::function<void()>& work) const;
 
  private:
@@ -35,7 +35,8 @@ struct DeviceMemory {
 };
 DeviceMemory memory_of(Device device);
 
-/// Bytes available there: on a device the free memory after torch has released its cache; on the host all memory.
+/// Returns the memory available to the network: on a device the free memory after torch has released its cache; on the
+/// host all memory.
 int64_t available_bytes(Device device);
 
 /// Elements of a contiguous tensor. Throws Error if its type differs.

@@ -27,7 +27,7 @@ Config as_mounted(Config config) {
 }
 
 struct TorchSession final : SessionParts {
-  /// its_policy: empty for one of its own, whose weights are drawn from the configuration's seed.
+  /// its_policy: null for a policy that this object owns, whose weights are drawn from the configuration's seed.
   TorchSession(const Config& its_config, Device its_device, const Rig& its_rig, double its_camera_severity,
                const Policy* its_policy = nullptr)
       : SessionParts(its_config, its_device, its_rig, its_camera_severity),
@@ -53,7 +53,7 @@ struct TorchSession final : SessionParts {
   std::unique_ptr<PolicyController> make_controller(Renderer* renderer, bool argmax, uint64_t seed,
                                                     bool hides_auxiliary) const override;
 
-  /// Runs the policy for the agents of a batch at `indices`, i64 [n].
+  /// Runs the policy for the agents at `indices`, i64 [n], of a batch.
   Decision decide(const PolicyInput& input, int64_t batch, const at::Tensor& indices, Renderer* renderer) const {
     at::set_num_threads(resolve_num_threads(config.run.num_threads));
     set_float32_products(config.train.precision);

@@ -3,8 +3,8 @@
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define PICTURA_HAS_WIDE_VECTORS 1
-/// Attribute of a function that is called only if has_wide_vectors() is true. Functions that it inlines are compiled in
-/// the same way.
+/// Attribute of a function that may be called only if has_wide_vectors() is true. Functions that are inlined into it
+/// are compiled for the same processor.
 #define PICTURA_WIDE [[gnu::target("avx512f,avx512bw,avx512dq,avx512vl,fma")]]
 #else
 #define PICTURA_HAS_WIDE_VECTORS 0
@@ -26,7 +26,7 @@ inline bool has_wide_vectors() {
 #endif
 }
 
-/// Vectors of floats, which may begin at any float.
+/// Vectors of floats without alignment: a vector may begin at any float.
 template <int kFloats>
 struct VectorOf {
   typedef float Type __attribute__((vector_size(kFloats * sizeof(float)), aligned(alignof(float)), may_alias));

@@ -27,10 +27,10 @@ PICTURA_HD inline int32_t draw_action(const float* log_probs, int num_actions, f
   return num_actions - 1;
 }
 
-/// Key of an action's draw: the agent and the time.
+/// Key of the random draw of an action: agent and time.
 struct ActionKey {
   uint64_t seed;
-  uint32_t global_world, agent, episode, step;  // agent: its number in its world
+  uint32_t global_world, agent, episode, step;  // agent: number within its world
 };
 
 PICTURA_HD inline int32_t draw_action(const float* log_probs, int num_actions, const ActionKey& key) {

@@ -1,5 +1,5 @@
-// Passes of a network over its activations between matrix products, each in one pass over memory where ATen takes
-// several. For CUDA devices; policy/host_passes.h has the host's.
+// Operations of a network on CUDA devices between matrix products, each in one pass over memory where ATen takes
+// several. policy/host_passes.h has those of the host.
 #pragma once
 
 #include <algorithm>
@@ -21,8 +21,8 @@ struct ActivationSize {
 
 /// Conversion of images to the input of the first convolution. A patch of patch_px^2 pixels, padded with black, becomes
 /// one position. Its channel (c * patch_px + y) * patch_px + x is color c of pixel (x, y) of the patch; further
-/// channels are 0. From u8 [views, cameras, 3, height_px, width_px] to [cameras, views, rows, columns, channels],
-/// colors from 0 to 255.
+/// channels are 0. Images are u8 [views, cameras, 3, height_px, width_px]; the result is [cameras, views, rows,
+/// columns, channels], with colors from 0 to 255.
 struct PatchSize {
   int64_t views = 0, cameras = 0, height_px = 0, width_px = 0, patch_px = 1;
   static constexpr bool supports(int64_t patch_px) { return patch_px >= 1 && patch_px <= 4; }
@@ -38,8 +38,8 @@ struct SegmentColumn {
   static constexpr int kCos = 4, kSin = 5;  // cosine and sine of the segment's direction
 };
 
-/// Features to compute from a row (see policy/row_features.h): those of each of the `points` pairs (x, y) at the row's
-/// begin and, if the row is a segment, those of the agent's position relative to it.
+/// Features to compute from a row (see policy/row_features.h). A row begins with `points` pairs (x, y), each of which
+/// has features. With of_segment the row is a segment, and the agent's position relative to it has features as well.
 struct RowFeatures {
   int points = 0;
   bool of_segment = false;
@@ -48,7 +48,8 @@ struct RowFeatures {
   PICTURA_HD constexpr int count() const { return points * kOfPoint + (of_segment ? kOfSegment : 0); }
 };
 
-/// Contiguous f32 rows that are converted to their features. With keeps_rows the row itself comes first.
+/// Size of contiguous f32 rows that are converted to their features. With keeps_rows a row itself precedes its
+/// features.
 struct RowSize {
   int64_t rows = 0, columns = 0;
   RowFeatures features;
@@ -87,7 +88,7 @@ PICTURA_HD inline float row_feature(const RowFeatures& features, const float* ro
 /// Size of sets of members, each encoded by a linear layer, GELU, and a second linear layer, both of kChannels outputs.
 /// With has_norm the first layer's outputs are normalized before the GELU.
 struct SetSize {
-  RowSize members;  // members of all sets, `max_members` a set including absent members; keeps_rows is set
+  RowSize members;  // members of all sets, with max_members rows per set, including absent members; keeps_rows is set
   int64_t max_members = 0;
   int64_t counts_stride = 1;  // elements from one set's member count to the next set's
   bool has_norm = false;
@@ -114,8 +115,8 @@ struct TokenSize {
   int64_t matrices = 0, tokens = 0, columns = 0;
 };
 
-/// Interface of the passes. Stateless; work is enqueued on the stream, and all memory is the device's. Sums over rows
-/// are in a fixed order.
+/// Interface of the passes. It has no state. Work is enqueued on the stream, and all memory is on the device. Sums over
+/// rows have a fixed order.
 class NetworkPasses {
  public:
   NetworkPasses() = default;

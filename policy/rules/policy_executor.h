@@ -1,4 +1,4 @@
-// Work of a policy outside its network: selects the agents that decide, chooses their actions, writes the commands.
+// Work of a policy outside its network: selecting the agents that decide, choosing their actions, and writing commands.
 // Executors for the host and for CUDA devices give the same bits.
 #pragma once
 
@@ -8,7 +8,7 @@
 namespace pictura {
 
 /// Executor, which serves one thread at a time. On a device all arrays are in its memory and work is enqueued on the
-/// stream. Only functions that return a count wait for it.
+/// stream. Only functions that return a count wait for the stream.
 class PolicyExecutor {
  public:
   PolicyExecutor() = default;
@@ -20,7 +20,8 @@ class PolicyExecutor {
   /// Memory that work may use: on a device the free memory; on the host all memory, since file caches can be freed.
   virtual int64_t memory_bytes() const = 0;
 
-  /// Selects the asked slots in ascending order. slots_out [slots] has room for all slots. Returns their number.
+  /// Writes the slots that `asked` selects to slots_out in ascending order, and returns their number. slots_out must
+  /// have room for all slots.
   virtual int64_t select_deciding(const DecidingSlots& asked, Span<int64_t> slots_out, Stream stream = {}) = 0;
   /// Chooses the actions of `slots`. log_probs: [slots.size(), kNumActions]; actions_out: [slots of the simulator],
   /// where actions of other slots remain unchanged.
