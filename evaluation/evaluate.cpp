@@ -30,14 +30,15 @@ DensityOf density_of(Density density) {
   return {kDensityNames[index], kDensityAgents[index]};
 }
 
-// Number of worlds simulated together: on a device all 200 of the paper's densities, which saturate it. Images do not
-// matter: they are drawn for train.forward_chunk agents at a time.
+// Number of worlds simulated together. On a device it is at least 200, the paper's number of scenarios per density,
+// which saturates the device. Images do not limit this number, since they are drawn for only train.forward_chunk agents
+// at a time.
 int worlds_per_batch(Device device, int agents_per_world) {
   const int max_agents = device.is_host() ? 4096 : 32768;
   return std::max(1, max_agents / agents_per_world);
 }
 
-// Copies the agents' fields that are counted to the host; all others are empty.
+// Copies to the host those fields of the agents' state from which counts are computed; all other fields are empty.
 AgentState counted_state(Simulator& simulator) {
   const AgentStateView state = simulator.state();
   AgentState host(0);
@@ -144,7 +145,8 @@ void check(const EvaluateOptions& options) {
   }
 }
 
-// Worlds of `count` scenarios from index `first` of the options' scenarios on, which cycle through the maps.
+// Returns the worlds of `count` scenarios from index `first` of the options' scenarios on. Scenarios cycle through the
+// maps.
 std::vector<WorldSpec> worlds_of(const EvaluateOptions& options, size_t num_maps, int agents, int first, int count) {
   std::vector<WorldSpec> worlds;
   for (int i = first; i < std::min(first + count, options.scenarios); ++i) {

@@ -30,12 +30,12 @@ class EvaluationObserver : public StepObserver {
  public:
   /// Called at the start of the worlds' episodes.
   virtual void begin(Simulator& simulator) = 0;
-  /// Called when all of these worlds are counted; not called if an interrupt ends them.
+  /// Called when all worlds of the batch are counted; not called if an interrupt ends the batch.
   virtual void end() {}
 };
 
 struct EvaluateOptions : DriverOptions {
-  std::vector<std::string> maps;  // as load_map() takes them; the paper's eight towns
+  std::vector<std::string> maps;  // as load_map() takes them; the paper has eight towns
   std::vector<Density> densities{Density::light, Density::medium, Density::dense};
   int agents_per_world = 0;         // > 0: replaces the densities' numbers of agents
   std::vector<std::string> others;  // other drivers, as other_drivers() reads them; see evaluation/mixed_traffic.h
@@ -84,8 +84,8 @@ struct EvaluationWorlds {
 CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world);
 
 /// Evaluates a driver. Scenario k is on map k modulo the number of maps, and draws its random numbers as world
-/// kFirstEvaluationWorld + k, so that it repeats no training world at any seed. Throws Error naming file and key for
-/// bad input.
+/// kFirstEvaluationWorld + k, so that it equals no training world at any seed. Throws Error naming file and key for bad
+/// input.
 EvaluateReport evaluate(const EvaluateOptions& options);
 /// Evaluates a session's policy, with the session's own device, renderer and cameras.
 EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options);

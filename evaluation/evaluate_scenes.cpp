@@ -43,7 +43,7 @@ std::string name_of(const SceneRef& scene) {
 /// Scenes that are simulated together.
 struct LoadedScenes {
   CompiledMaps maps;
-  std::vector<int> numbers;  // [maps] number of each among all scenes
+  std::vector<int> numbers;  // [maps] number of each map's scene among all scenes
   // Scenes that are left out:
   std::vector<std::string> faults;
   int without_drivers = 0;

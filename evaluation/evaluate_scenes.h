@@ -47,7 +47,7 @@ struct SceneEvaluation {
 SimulatorConfig protocol_config(const SceneProtocol& protocol, SimulatorConfig config);
 
 /// Evaluates a driver in recorded scenes. Scenes that cannot be read or simulated are left out and reported. Throws
-/// Error if there are no scenes or none can be evaluated; UsageError for an invalid protocol.
+/// Error if there are no scenes or if no scene can be evaluated; UsageError for an invalid protocol.
 SceneEvaluation evaluate_scenes(const SceneEvaluateOptions& options);
 
 }  // namespace pictura

@@ -49,7 +49,7 @@ struct Driving {
 /// Number of active agents in all worlds.
 int64_t count_active(Simulator& simulator);
 /// Creates a controller of a session's policy in a simulator, with argmax and seed of the options. If the simulator
-/// fills auxiliary slots, a policy that was trained without them gets zeros, as in training.
+/// fills auxiliary slots, a policy that was trained without them reads zeros in these slots, as in training.
 std::unique_ptr<PolicyController> policy_controller(PolicySession& session, Renderer* renderer,
                                                     const DriverOptions& options, const Simulator& simulator);
 

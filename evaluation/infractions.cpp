@@ -26,7 +26,7 @@ constexpr float kJustRed_s = 1, kFarHead_m = 10;
 // Point on a lane's centre line that is nearest to a position.
 struct LanePlace {
   float s_m = 0;       // distance from the lane's start
-  float radius_m = 0;  // radius of the line there, over 10 m to both sides
+  float radius_m = 0;  // radius of the line at this point, measured over 10 m to both sides
 };
 
 LanePlace place_on(const RoadMap& map, const Lane& lane, Vec2 position_m) {
@@ -117,7 +117,8 @@ struct InfractionObserver::Frame : WorldArrays {
   }
 };
 
-// Step of one world: arrays before and after it. Agents, boxes and lights are the world's own.
+// One step of one world: arrays before and after the step. Indices of agents, boxes and lights are relative to the
+// world.
 struct InfractionObserver::WorldStep {
   const WorldSpec& spec;
   const RoadMap& map;

@@ -38,7 +38,7 @@ struct Infraction {
   float speed_mps = 0, lane_offset_m = 0, lane_angle_rad = 0;
   RoadShape shape = RoadShape::no_lane;
   bool changed_lane = false;  // to a neighbouring lane within the last 3 s
-  bool before_merge = false;  // the lane ends within 30 m where another lane joins, outside junctions
+  bool before_merge = false;  // outside junctions: the lane ends within 30 m at a place where another lane joins
   // Values of collisions:
   CollisionPartner partner = CollisionPartner::none;
   PartnerMotion partner_motion = PartnerMotion::none;
@@ -52,8 +52,8 @@ struct Infraction {
   bool is(Event event) const { return (events & event) != 0; }
 };
 
-/// Collects the infractions of all agents of an evaluation. On a device it copies the data that it reads to the host at
-/// every step.
+/// Collects the infractions of all agents of an evaluation. On a device, the data that it reads are copied to the host
+/// at every step.
 class InfractionObserver final : public EvaluationObserver {
  public:
   InfractionObserver();

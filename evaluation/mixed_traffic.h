@@ -44,7 +44,8 @@ class MixedTraffic {
   size_t num_drivers() const;
   /// Name of the driver; empty for driver 0.
   std::string name(size_t driver) const;
-  /// Entries of the others in an evaluation's setting: a policy's hash or a controller's name, and its share.
+  /// Returns the other drivers' entries in an evaluation's setting: a policy's hash or a controller's name, and the
+  /// driver's share.
   std::vector<std::string> setting() const;
   /// Returns the configuration of the world, extended by all arrays that one of the drivers reads, and by impaired
   /// agents.
@@ -54,8 +55,8 @@ class MixedTraffic {
   /// are drawn first; then the other vehicles are assigned. Driver 0 drives all pedestrians and cyclists that are not
   /// impaired.
   std::vector<uint8_t> driver_of_slots(Simulator& simulator) const;
-  /// Combines `own`, driver 0, with the others for a simulator at the start of its episodes. This object must outlive
-  /// the result.
+  /// Combines `own`, which is driver 0, with the other drivers, for a simulator at the start of its episodes. This
+  /// object must outlive the result.
   Driving share(Driving own, Simulator& simulator, const std::vector<uint8_t>& driver_of_slot) const;
 
  private:

@@ -45,7 +45,7 @@ namespace pictura {
   X(double, red_wait_moved_m) /* distance moved during waits, forwards or backwards */            \
   X(int64_t, stuck_at_end)    /* vehicles that are active in the last step, with less than 5 m of progress in 60 s */
 
-/// Counts of how the vehicles of one scenario stand and reverse. 0 in files of earlier versions.
+/// Counts of standing and reversing by the vehicles of one scenario. All are 0 in files of earlier versions.
 struct StandingCounts {
 #define X(type, name) type name = 0;
   PICTURA_STANDING_COUNTS(X)

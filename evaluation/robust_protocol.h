@@ -27,7 +27,8 @@ struct RobustCondition {
   double camera_severity = 0;       // as SessionOptions::camera_severity
 };
 
-/// Conditions in the order of the table. The first is the reference of all others.
+/// Returns the conditions in the order of the table. The first condition is the reference with which all others are
+/// compared.
 const std::vector<RobustCondition>& robust_conditions();
 
 /// Metrics of the evaluated driver in one condition.

@@ -41,7 +41,7 @@ struct SceneProtocol {
   RecordEnd record_end = RecordEnd::stand;  // behavior of replayed road users after the end of their recording
   AfterInfraction after_infraction = AfterInfraction::halt;
   bool leave_at_goal = true;
-  Waypoints waypoints = Waypoints::goal;  // the goal three times, or points on the recorded path before it
+  Waypoints waypoints = Waypoints::goal;  // three times the goal, or two points on the recorded path and the goal
   float observed_span_m = 5;              // see MapOptions
 };
 

@@ -66,7 +66,7 @@ struct SceneAgent {
   TrackType type = TrackType::unset;
   int32_t takeover_step = 0;  // episode step
   int32_t driven_steps = 0;
-  int events = 0;  // events of its episode: bits of Event
+  int events = 0;  // events of the agent's episode: bits of Event
   bool arrived = false;
   float distance_m = 0;
   // Distance from the recorded positions: mean over the steps that are recorded while the agent drives, and at the last

@@ -37,8 +37,8 @@ void check_rollouts(const SceneProtocol& protocol);
 /// int32.
 std::string encoded(const SceneRollouts& scene);
 
-/// File of one message SimAgentsChallengeSubmission, with its type and scenes but without its authors. Concatenated
-/// files also form such a message.
+/// Writer of a file with one message SimAgentsChallengeSubmission, which contains the type and the scenes of a
+/// submission but no authors. Concatenated files also form such a message.
 class RolloutsFile {
  public:
   explicit RolloutsFile(const std::string& path);

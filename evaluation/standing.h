@@ -9,13 +9,13 @@
 
 namespace pictura {
 
-/// Counts StandingCounts of worlds that are driven to their end. On a device it copies the data that it reads to the
-/// host at every step.
+/// Computes the StandingCounts of worlds that are driven to their end. On a device, the data that it reads are copied
+/// to the host at every step.
 class StandingObserver final : public StepObserver {
  public:
   /// Creates an observer; the simulator's worlds must be at the start of their episodes.
   explicit StandingObserver(Simulator& simulator);
-  /// Counts vehicles of each driver separately: driver_of_slot [slots] holds their numbers, below num_drivers.
+  /// Counts the vehicles of each driver separately. driver_of_slot: [slots] numbers of drivers, below num_drivers.
   StandingObserver(Simulator& simulator, std::vector<uint8_t> driver_of_slot, size_t num_drivers);
 
   void after_step(const StepResult& result) override;

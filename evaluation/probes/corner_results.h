@@ -97,8 +97,9 @@ struct CornerRow {
   std::array<int64_t, kTakeoverSteps + 1> driving{};     // number of runs that have not ended
 };
 
-/// Returns the rows with walls, then without: for each policy its cases; for each further policy its differences from
-/// the first policy; for each policy hidden minus removed and hidden minus empty.
+/// Returns the rows of runs with walls, then of runs without walls. Each part has rows of every policy's cases, of the
+/// differences between each further policy and the first policy, and of each policy's differences hidden minus removed
+/// and hidden minus empty.
 std::vector<CornerRow> summarize(const CornerResults& results);
 
 /// Writes a row for each run, with a header. Throws Error naming the path.

@@ -17,7 +17,7 @@ Vec3 end_of(const RoadMap& map, int32_t lane) {
   return points[points.size() - 1].position_m;
 }
 
-// Returns a lane into a junction and the lanes that lead to it, the nearest first.
+// Returns a lane into a junction and the lanes that lead to this lane, the nearest first.
 std::vector<int32_t> lanes_to(const RoadMap& map, int32_t approach) {
   std::vector<int32_t> lanes{approach};
   float length_m = map.lanes[approach].length_m;
@@ -104,7 +104,7 @@ std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t worl
 
 std::vector<CornerPair> match_corners(const std::vector<CornerState>& hidden, const std::vector<CornerState>& empty,
                                       int64_t count) {
-  // First state of each ego and user, by scene.
+  // First hidden state of each pair of ego and user, by scene.
   std::map<int32_t, std::vector<CornerState>> of_scene;
   std::vector<CornerState> ordered = hidden, unused = empty;
   const auto before = [](const CornerState& a, const CornerState& b) { return order_of(a) < order_of(b); };

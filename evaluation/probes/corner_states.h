@@ -19,11 +19,12 @@ struct ProbeFrame;
 struct BlindCorner {
   int32_t junction = -1;
   Vec3 entry_m;  // end of the lane
-  // Lanes of hidden traffic, up to kCornerLead_m before the junction, each with its entry into the junction.
+  // Lanes of hidden traffic up to kCornerLead_m before the junction. Each lane is mapped to the place at which its
+  // traffic enters the junction.
   std::map<int32_t, Vec3> lanes;
 };
 constexpr float kCornerLead_m = 60;
-/// Blind corners by the lanes that lead to them, up to kCornerLead_m before the junction.
+/// Blind corners by lane: every lane within kCornerLead_m before the junction that leads to a corner has an entry.
 using BlindCorners = std::map<int32_t, BlindCorner>;
 BlindCorners find_blind_corners(const RoadMap& map, Span<const WallFace> walls);
 

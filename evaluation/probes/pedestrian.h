@@ -34,12 +34,12 @@ void visit_options(PedestrianOptions& options, Visitor&& v) {
 
 /// Drives evaluation worlds as probe_removal() does, and searches their states for paths automatically. A path needs an
 /// active vehicle, the ego; a vehicle or parked car ahead of it within hider_range_m, the hider; and one of
-/// paths_behind() the hider. Along it a pedestrian is wholly hidden, seen, and wholly hidden again (usable_part()),
-/// first by the hider. The pedestrian is placed on each point of the path in the otherwise unchanged state, and each
-/// policy gets its input with and without the pedestrian: for vectors Simulator::observe, for images a scene with its
-/// box. Visibility is measured, and paths are chosen, in the cameras of the first policy that reads images, or in the
-/// paper's. An interrupt ends the probe with the completed cases. Throws UsageError if scenes cannot be shared equally,
-/// Error naming file and key for bad input.
+/// paths_behind() the hider. Along the path a pedestrian is wholly hidden by the hider, then seen, and then wholly
+/// hidden again (usable_part()). The pedestrian is placed on each point of the path in the otherwise unchanged state,
+/// and each policy gets its input with and without the pedestrian: for vectors Simulator::observe, for images a scene
+/// with its box. Visibility is measured, and paths are chosen, in the cameras of the first policy that reads images, or
+/// in the paper's. An interrupt ends the probe with the completed cases. Throws UsageError if scenes cannot be shared
+/// equally, Error naming file and key for bad input.
 PedestrianResults probe_pedestrian(const PedestrianOptions& options);
 /// Probes open policies of one device, with their renderers and cameras; options.policies names them.
 PedestrianResults probe_pedestrian(const std::vector<PolicySession*>& sessions, const PedestrianOptions& options);

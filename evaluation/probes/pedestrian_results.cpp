@@ -14,7 +14,7 @@ namespace pictura {
 
 namespace {
 
-// Sums over points, of one policy.
+// Sums over points for one policy.
 struct PointSums {
   ResponseSums responses;
   double visible_share = 0;

@@ -10,13 +10,13 @@ namespace pictura {
 /// Adds the numbers of cases and scenes, and the estimates.
 void add_means(const ResponseMeans& means, Json* json_out);
 
-/// Policies, each with the number of cases in scenes that it drove. drivers: [cases].
+/// Returns the policies, each with the number of cases in the scenes that the policy drove. drivers: [cases].
 Json policies_json(const ProbeResults& results, const std::vector<int32_t>& drivers);
 
 /// Adds the worlds, their drivers and driving mode, and the duration.
 void add_setting(const ProbeResults& results, Json* json_out);
 
-/// Text of a summary: `json`, the setting, and to_json(row) of each row.
+/// Returns the text of a summary, which consists of `json`, the setting, and to_json(row) of each row.
 template <typename Row, typename ToJson>
 std::string summary_text(const ProbeResults& results, Json json, const std::vector<Row>& rows, const ToJson& to_json) {
   add_setting(results, &json);

@@ -44,8 +44,8 @@ void visit_options(ProbeOptions& probe, Visitor&& v) {
           probe.batch);
 }
 
-/// Number of cases in every pass through a network. Cases with and without their road user are at the same places of
-/// two passes, so that equal inputs give equal bits.
+/// Number of cases in every pass through a network. A case with its road user and the same case without it have the
+/// same place in two passes, so that equal inputs give bit-identical outputs.
 constexpr int probe_pass(Device device) { return device.is_host() ? 256 : 2048; }
 
 /// Returns the default number of scenes: each policy drives equally many on each map, and each map has two scenes or

@@ -21,17 +21,18 @@ struct PairedResponse {
 };
 
 struct ProbedPolicy {
-  std::string name;  // unique name of its file or run
+  std::string name;  // unique name of the policy's file or run
   std::string path, hash;
   bool reads_images = false;
-  std::string untrained_hash;  // hash of the fresh weights that respond in its place; empty: the policy itself responds
+  std::string untrained_hash;  // hash of the fresh weights that respond instead of the policy; empty: the policy itself
+                               // responds
 
   /// Name of the responding policy in figures and tables.
   std::string responding_name() const { return untrained_hash.empty() ? name : "untrained " + name; }
 };
 
 struct ProbeResults {
-  EvaluationSetting setting;  // setting of the worlds; its policy-specific parts are the first policy's
+  EvaluationSetting setting;  // setting of the worlds; the policy-specific parts are those of the first policy
   std::string density;
   int agents_per_world = 0;
   int first_scene = 0, scenes = 0;  // driven scenes: each policy drives an equal share, in the order of policies

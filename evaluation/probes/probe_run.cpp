@@ -168,7 +168,7 @@ struct ProbeRun::ObservedWorlds {
 struct ProbeRun::Participant {
   PolicySession* session = nullptr;          // drives
   std::unique_ptr<PolicySession> untrained;  // responds instead of `session`
-  std::unique_ptr<Renderer> renderer;        // renderer of its images, with the maps
+  std::unique_ptr<Renderer> renderer;        // renderer of the session's images, with the maps
   ObservedWorlds* worlds = nullptr;          // worlds in which it drives and which it observes
 
   PolicySession& answering() const { return untrained ? *untrained : *session; }
@@ -288,7 +288,7 @@ void ProbeRun::for_each_other(const F& f) {
   }
 }
 
-// Options of the worlds that the driver drives, one of `shares` equal shares.
+// Returns options of the worlds that the present driver drives, which are one of `shares` equal shares.
 EvaluateOptions ProbeRun::share_of_driver(int shares) {
   EvaluateOptions worlds = options_.worlds;
   worlds.densities.resize(1);

@@ -59,7 +59,8 @@ struct KeptScene {
 
   /// Adds a world, followed by inserted boxes.
   void add_world(const ProbeFrame& frame, size_t world, Span<const InsertedBox> inserted = {});
-  /// Indices in the last added world: of a box of its frame, and of the first inserted box.
+  /// Indices in this scene of boxes of the last added world: of a box of the world's frame, and of the first inserted
+  /// box.
   int32_t box_of(const ProbeFrame& frame, size_t world, int32_t box_of_frame) const {
     return box_of_frame - frame.box_begin[world] + world_begin[geometry.size() - 1];
   }

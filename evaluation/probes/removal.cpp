@@ -11,7 +11,7 @@ namespace pictura {
 
 namespace {
 
-// Case, with the positions of its world and agents in a frame.
+// Case, with the indices of its world and agents in a frame.
 struct DrawnCase {
   RemovalCase facts;
   size_t world = 0;

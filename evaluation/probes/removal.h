@@ -1,5 +1,6 @@
 // Counterfactual removal (paper, "Counterfactual probes reveal visual grounding"): responses of policies to a state
-// with and without one of its road users, by how much of that user the ego's cameras could see. Has no torch headers.
+// with and without one of the state's road users, grouped by how much of that user the ego's cameras show. Has no torch
+// headers.
 #pragma once
 
 #include <vector>

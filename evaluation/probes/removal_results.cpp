@@ -24,7 +24,7 @@ int occlusion_bin(const RemovalCase& one) {
 
 int distance_band(const RemovalCase& one) { return static_cast<int>(one.distance_m / kDistanceBand_m); }
 
-// Sums over a group's cases, of one policy.
+// Sums over the cases of a group for one policy.
 struct GroupSums {
   ResponseSums responses;
   double occlusion = 0;
