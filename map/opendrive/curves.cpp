@@ -130,7 +130,7 @@ double banked_t(const FileRoad& road, double s, double t) {
   return t;
 }
 
-/// Change of heading of a spiral from its start to ds.
+/// Returns the change of heading of a spiral from its start to `ds`.
 double spiral_turn(const GeometryPiece& piece, double ds) {
   const double rate = (piece.end_curvature - piece.start_curvature) / piece.length;
   return ds * (piece.start_curvature + 0.5 * rate * ds);
@@ -165,7 +165,7 @@ Pose pose_on(const GeometryPiece& piece, double ds, LastDirection* last) {
   return {in_file(piece, in_frame), piece.heading + spiral_turn(piece, ds), k0 + rate * ds};
 }
 
-/// Shift of a deformed road at s, and its first two derivatives by s.
+/// Shift of a deformed road at s, and the shift's first two derivatives by s.
 struct Shift {
   Eigen::Vector2d value_m{0, 0}, slope{0, 0}, bend{0, 0};
 };

@@ -93,7 +93,8 @@ class ShiftSolver {
  private:
   bool is_in_junction(std::size_t end) const { return !network_.roads[end / 2].junction.empty(); }
 
-  /// Sets the shift of an end, and of the road's other end if that has none. Does nothing if the end has a shift.
+  /// Sets the shift of an end, and of the road's other end if the other end has no shift. Does nothing if `end` has a
+  /// shift.
   void set_shift(std::size_t end, const Eigen::Vector2d& shift_m) {
     for (const std::size_t each : {end, end ^ 1}) {
       if (shifts_[each]) return;
@@ -102,7 +103,8 @@ class ShiftSolver {
     }
   }
 
-  /// Returns the group of an end on the first request, and makes the end its anchor; returns nothing later.
+  /// Returns the members of an end's group and makes the end the group's anchor. For later ends of the same group,
+  /// returns an empty list.
   std::vector<std::size_t> take_members(std::size_t end) {
     const std::size_t group = ends_.group_of(end);
     anchors_.try_emplace(group, end);
@@ -127,7 +129,7 @@ class ShiftSolver {
   std::vector<std::optional<Eigen::Vector2d>> shifts_;    // [ends]
   std::unordered_map<std::size_t, std::size_t> anchors_;  // by group
   std::vector<Pose> poses_;                               // [ends] in the network before the deformation
-  std::vector<std::size_t> reached_;                      // ends whose groups still have to follow them
+  std::vector<std::size_t> reached_;                      // ends with new shifts, whose groups are not yet shifted
 };
 
 }  // namespace

@@ -41,7 +41,7 @@ Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, c
   return result;
 }
 
-/// Makes adjacent route lanes with the same direction of travel neighbours.
+/// Sets the neighbours of route lanes: adjacent lanes with the same direction of travel.
 void join_neighbors(Build* build, const FileRoad& road, const FileSection& section, const SectionLanes& indices) {
   std::vector<Lane>& lanes = build->map->lanes;
   auto join = [&](const FileLane& left, const FileLane& right) {

@@ -45,7 +45,7 @@ class Linker {
 
   const FileLane* file_lane(const LaneEnd& end) const { return road_of(end.road).sections[end.section].lane(end.id); }
 
-  /// Whether the lane exists; if not, the link to it is repaired by omission.
+  /// Whether the lane of an end exists. If not, the fault is repaired by omitting the link to the lane.
   bool exists(const LaneEnd& end, const SourceLocation& where) const {
     if (file_lane(end)) return true;
     where.record_repair(build_.faults, RepairKind::missing_lane,

@@ -119,10 +119,10 @@ struct FileLane {
   int id = 0;  // positive left of the reference line, negative right; 0: the line itself
   std::string type_name;
   LaneType type = LaneType::other;
-  int section = 0;            // index of the file's <laneSection> in its road, from 0
+  int section = 0;            // index of the file's <laneSection> in the road, from 0
   bool is_continued = false;  // continues a <lane> of an earlier FileSection
   bool is_void = false;       // type "none": no surface
-  bool is_level = false;      // keeps the height of its inner border on banked roads
+  bool is_level = false;      // on banked roads the lane keeps the height of its inner border
   LaneDirection direction = LaneDirection::standard;
   std::vector<int> predecessors, successors;
   // Functions of s minus the section's s.

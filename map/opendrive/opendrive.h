@@ -23,7 +23,7 @@ using ImportProgress = std::function<void(const char* stage, double done)>;
 
 /// Parses the text of an OpenDRIVE file. `source` is its name in messages. Faults that have one sensible meaning are
 /// repaired and recorded in `RoadMap::mends`. Throws Error naming source, line, owner and element for all other faults,
-/// and in strict reading for any fault. docs/reference/opendrive_conformance.md lists them.
+/// and in strict reading for any fault. docs/reference/opendrive_conformance.md lists the faults.
 RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options = {},
                         const ImportProgress& progress = {});
 

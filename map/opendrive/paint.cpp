@@ -207,7 +207,8 @@ void add_crosswalk(Build* build, std::size_t road, const FileObject& object) {
   map.provenance.crosswalks.push_back(source_of(road, object.where));
 }
 
-/// Adds a stop line along the longer extent of the corners, centred in the shorter extent, which is its width.
+/// Adds a stop line along the longer extent of the corners. The shorter extent is the line's width, in the middle of
+/// which the line runs.
 void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
   constexpr std::size_t kMaxCorners = 64;
   const std::vector<Vec3> corners = corners_of(build, build->network.roads[road], object);

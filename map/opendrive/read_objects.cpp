@@ -12,7 +12,7 @@ namespace {
 
 // Maximum distance of objects before the start or after the end of their road.
 constexpr double kMaxOverhang_m = 10;
-// Minimum repeat distance; smaller distances mean one continuous object.
+// Minimum distance between the copies of a <repeat>; a smaller distance means one continuous object.
 constexpr double kMinRepeat_m = 0.1;
 constexpr std::size_t kMaxCopies = 10'000;
 constexpr std::size_t kMaxCopiedCorners = 1'000'000;
@@ -63,7 +63,7 @@ double read_height(const Element& element, const char* attribute) {
   return element.number_in(attribute, -kMaxHeight_m, kMaxHeight_m, 0);
 }
 
-/// Returns the outer outline of an object's outlines; the others are holes or parts of it.
+/// Returns the outer one of an object's outlines; the other outlines are holes in the object or parts of it.
 Element outer_outline(const Element& element) {
   Element outline = element.child("outline");
   if (const Element outlines = element.child("outlines"); !outline && outlines) {

@@ -28,7 +28,7 @@ struct PlacedSignal {
   const FileSignal* signal = nullptr;
 };
 
-/// Junction of a signal and its green phase.
+/// Junction of a signal, and the signal's green phase.
 struct Phase {
   int32_t junction = -1, phase = 0;
 };
@@ -210,8 +210,8 @@ class SignalBuilder {
   }
 
   /// Finds the approaches of a lane. A junction's lane is followed back to its start, where its drivable predecessors
-  /// are the incoming lanes. A lane that leads to a junction is followed to its end, where its last piece is the
-  /// incoming lane.
+  /// are the incoming lanes. A lane that leads to a junction is followed to the road's end, and the last lane of this
+  /// chain is the incoming lane.
   void find_approaches(int32_t start, Approaches* approaches) const {
     if (lane(start).in_junction) {
       const std::vector<int32_t> connecting = along_road(start, &Lane::predecessors);
@@ -241,7 +241,8 @@ class SignalBuilder {
     return approach.connecting.empty() ? -1 : lane(approach.connecting.front()).junction;
   }
 
-  /// Adds a head to the lines of its approaches. In a junction with controllers, a head without one is omitted.
+  /// Adds a head to the stop lines of the approaches that it controls. In a junction whose lights have controllers, a
+  /// head without a controller is omitted.
   void add_uncontrolled(std::size_t signal_index, const Approaches& approaches) {
     const FileSignal& signal = *placed_signals_[signal_index].signal;
     if (const char* const junction = ruled_junction(approaches)) {

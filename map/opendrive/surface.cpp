@@ -31,7 +31,7 @@ SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& sec
   auto border = [&](double outer_fraction, double s) {
     return build->from_origin(point_on_lane(road, section, lane, s, outer_fraction, &build->stations));
   };
-  // Both borders are sampled at the same stations, the union of the stations of both.
+  // Both borders are sampled at the union of the stations that each border needs.
   const CurveBreaks breaks = breaks_of(road, section, lane.id, section.s, section.end);
   std::array<std::vector<CurvePoint>, 2> sampled;
   std::vector<double> stations;
@@ -59,7 +59,7 @@ SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& sec
   return band;
 }
 
-/// Makes one band per selected lane of the map; `roads_out`, unless null, gets the road of each band.
+/// Returns one band per selected lane of the map. roads_out, unless null, receives the road of each band.
 template <typename IsSelected>
 std::vector<SurfaceBand> lane_bands(Build* build, double chord_error_m, std::vector<int32_t>* roads_out,
                                     IsSelected&& is_selected) {

@@ -16,7 +16,7 @@ namespace pictura::opendrive {
 
 namespace {
 
-/// Value of an attribute. fmt prints the shortest digits that read back as the same double.
+/// Value of an attribute. A number is printed by fmt with the fewest digits that read back as the same double.
 class Value {
  public:
   Value(const std::string& text) : text_(text) {}
