@@ -14,8 +14,8 @@ struct ReadMatrix {
 };
 
 /// Sets out = a b. a: [rows, inner]; b: [inner, columns] without gaps; out: [rows, columns] without gaps, must not
-/// overlap a or b. Products are summed in order, so the bits of a row do not depend on other rows or on the width of
-/// vectors.
+/// overlap a or b. Products are summed in a fixed order, so the bits of a row do not depend on other rows or on the
+/// width of vectors.
 void multiply(const ReadMatrix& a, const float* b, int64_t rows, int64_t inner, int64_t columns, float* out,
               bool is_wide = has_wide_vectors());
 

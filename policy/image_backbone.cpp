@@ -110,7 +110,7 @@ void ImageBackbone::check_images(const Rig& rig) const {
 }
 
 at::Tensor ImageBackbone::forward(const at::Tensor& images) const {
-  // Devices may pad images with further channels, which are 0.
+  // image_patches() may pad images with further channels, which are 0.
   const at::Tensor pixels = image_patches(images, /*patch_px=*/1, parts_->type).narrow(1, 0, 3) / 255.0;
   const int64_t height = pixels.size(2), width = pixels.size(3), patch = parts_->patch_px;
   const at::Tensor whole =

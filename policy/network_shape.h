@@ -13,7 +13,8 @@ namespace pictura {
 /// Number of ego features. Policies that read images lack the two auxiliary slots, which come last.
 constexpr int num_ego_features(bool sees_images) { return sees_images ? kEgoFeatures - 2 : kEgoFeatures; }
 
-/// Features to compute for each row of the named observation array: an entity set, or the waypoints.
+/// Returns the features to compute for each row of the observation array of this name, which is an entity set or the
+/// waypoints.
 inline RowFeatures row_features_of(const PolicySection& policy, std::string_view array) {
   const int points = array == "controls" ? 2 : 1;  // a stop line has two ends
   const bool is_segment = array == "lanes" || array == "boundaries" || array == "walls";

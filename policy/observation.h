@@ -49,7 +49,7 @@ inline constexpr at::Tensor Observation::* kObservationTensors[] = {
 #undef X
 };
 
-/// Whether an array holds the members of an entity set, which set_counts counts.
+/// Whether an array holds the members of an entity set; set_counts holds their number.
 constexpr bool is_set(const ObservationArray& array) {
   return array.part != ObservationPart::own && array.type == ElementType::f32;
 }

@@ -20,7 +20,7 @@ StoredTensor repeat_over_patches(const StoredTensor& weight, int factor) {
   StoredTensor result{weight.name, weight.shape, {}};
   result.shape[1] = 3 * large * large;
   result.values.reserve(weight.values.size() * static_cast<size_t>(factor * factor));
-  for (int64_t plane = 0; plane < weight.shape[0] * 3; ++plane) {  // one plane for each output and color
+  for (int64_t plane = 0; plane < weight.shape[0] * 3; ++plane) {  // one plane per output and color
     for (int64_t y = 0; y < large; ++y) {
       for (int64_t x = 0; x < large; ++x) {
         const auto from = weight.values.begin() + ((plane * side + y / factor) * side + x / factor) * of_tap;

@@ -235,7 +235,8 @@ class PerspectiveEncoder final : public SceneEncoder {
     return backbone;
   }
 
-  // Side of the patches that the first convolution reads: policy.patch_px, or more after it was spread.
+  // Side of the patches that the first convolution reads: policy.patch_px, or a larger side if the convolution was
+  // spread.
   int patch_px() const { return patch_side_px(convolutions_[0].weight.size(1)); }
 
   // Returns feature maps [cameras * batch, width, rows, columns], channels last in memory. images: as in ImageBlock.
@@ -251,8 +252,8 @@ class PerspectiveEncoder final : public SceneEncoder {
     return x;
   }
 
-  // Returns the features of a block's cameras, [cameras, batch, width]. The mean over queries precedes the MLP's last
-  // layer, which is linear: a product with one row instead of num_queries.
+  // Returns the features of a block's cameras, [cameras, batch, width]. The mean over queries is computed before the
+  // MLP's last layer, which is linear, so that the product has one row instead of num_queries rows.
   at::Tensor pool(const ImageBlock& block) const {
     const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1);
     const at::Tensor x = backbone_ ? backbone_->forward(block.pixels) : convolve(block.pixels);

@@ -39,7 +39,7 @@ struct PolicyInput {
 /// decide.
 class PolicyController : public Controller {
  public:
-  /// Number of agents that the last act() commanded: the active agents of its mask.
+  /// Number of agents that the last act() commanded, which are the active agents that its mask selects.
   virtual int64_t num_driven() const = 0;
 };
 
@@ -56,8 +56,8 @@ RendererConfig evaluation_renderer_config(const Config& config, const Rig& rig, 
 class PolicySession {
  public:
   /// Opens the policy of a checkpoint, or of safetensors that training or `pictura export` wrote. Throws Error naming
-  /// the file if it is neither, truncated, of another observation schema or architecture, or cannot run on this device.
-  /// Throws UsageError if it cannot use the cameras of the options.
+  /// the file if it is neither, if it is truncated, if it has another observation schema or architecture, or if its
+  /// policy cannot run on this device. Throws UsageError if the policy cannot use the cameras of the options.
   explicit PolicySession(const std::string& path, const SessionOptions& options = {});
   /// Wraps the policy of a configuration with the cameras of `rig`, which are not randomized. Every call uses the
   /// policy's weights at that time. The policy must outlive the session. Builds without torch lack this constructor.
@@ -66,8 +66,7 @@ class PolicySession {
   explicit PolicySession(std::unique_ptr<SessionParts> parts);
   ~PolicySession();
   /// Returns the same policy before training, in the same worlds and with the same cameras: weights are drawn from
-  /// `seed` as train draws them, except those of a backbone's program. Throws Error in builds without
-  /// torch.
+  /// `seed` as training draws them, except those of a backbone's program. Throws Error in builds without torch.
   std::unique_ptr<PolicySession> make_untrained(uint64_t seed) const;
   PolicySession(const PolicySession&) = delete;
   PolicySession& operator=(const PolicySession&) = delete;

@@ -25,7 +25,7 @@ using nlohmann::ordered_json;
 constexpr std::string_view kNoHash = "0000000000000000";
 constexpr size_t kLengthBytes = sizeof(uint64_t);
 
-// Returns a tensor as a file holds it.
+// Converts a tensor to the form in files.
 SafeTensor safe_tensor(const StoredTensor& tensor, WeightType weights) {
   if (weights == WeightType::f32) {
     return {tensor.name,

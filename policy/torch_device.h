@@ -49,7 +49,7 @@ template <typename T>
 at::Tensor tensor_over(Span<T> array, Device device, at::IntArrayRef shape) {
   using Element = std::remove_const_t<T>;
   const at::Device where = torch_device(device);
-  // for_blob takes no pointer to const. With the location given, it does not query the driver.
+  // for_blob() takes no pointer to const. It is given the location, so that it need not query the driver.
   return at::for_blob(const_cast<Element*>(array.data()), shape)
       .options(at::TensorOptions(c10::CppTypeToScalarType<StoredAs<Element>>::value).device(where))
       .target_device(where)

@@ -1,5 +1,5 @@
 // Chooses an action from the log-probabilities of one agent: the most likely action, or a draw. Draws are keyed by
-// (seed, global world, agent, episode, step), so they depend on no order and no device.
+// (seed, global world, agent, episode, step), so they do not depend on an order or a device.
 #pragma once
 
 #include "pictura/common/math.h"

@@ -26,14 +26,14 @@ struct ActivationSize {
 struct PatchSize {
   int64_t views = 0, cameras = 0, height_px = 0, width_px = 0, patch_px = 1;
   static constexpr bool supports(int64_t patch_px) { return patch_px >= 1 && patch_px <= 4; }
-  /// Channels of a position: rounded up to whole vectors of 8, as matrix units need them.
+  /// Channels of a position, rounded up to a multiple of 8, since matrix units read vectors of 8.
   PICTURA_HD static constexpr int64_t channels_of(int64_t patch_px) { return (3 * patch_px * patch_px + 7) / 8 * 8; }
   PICTURA_HD int64_t rows() const { return (height_px + patch_px - 1) / patch_px; }
   PICTURA_HD int64_t columns() const { return (width_px + patch_px - 1) / patch_px; }
 };
 
-/// Columns of a segment's row (docs/reference/observation.md) from which features are computed, besides x and y of its
-/// middle.
+/// Columns of a segment's row (docs/reference/observation.md) from which features are computed, besides x and y of the
+/// segment's middle.
 struct SegmentColumn {
   static constexpr int kCos = 4, kSin = 5;  // cosine and sine of the segment's direction
 };
@@ -90,7 +90,7 @@ PICTURA_HD inline float row_feature(const RowFeatures& features, const float* ro
 struct SetSize {
   RowSize members;  // members of all sets, with max_members rows per set, including absent members; keeps_rows is set
   int64_t max_members = 0;
-  int64_t counts_stride = 1;  // elements from one set's member count to the next set's
+  int64_t counts_stride = 1;  // distance, in elements, between the member counts of successive sets
   bool has_norm = false;
   static constexpr int kChannels = 64, kMaxWidth = 32, kMaxMembers = 254, kNoMember = 255;
   PICTURA_HD int64_t sets() const { return members.rows / max_members; }
