@@ -7,9 +7,9 @@
 
 #include "pictura/evaluation/evaluated_driver.h"
 #include "pictura/evaluation/realism.h"
-#include "pictura/evaluation/scene_protocol.h"
 #include "pictura/evaluation/scene_results.h"
 #include "pictura/evaluation/scene_rollouts.h"
+#include "pictura/simulator/scene_protocol.h"
 
 namespace pictura {
 

@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "pictura/evaluation/scene_protocol.h"
 #include "pictura/simulator/compiled_map.h"
+#include "pictura/simulator/scene_protocol.h"
 
 namespace pictura {
 

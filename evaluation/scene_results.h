@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "pictura/evaluation/results.h"
-#include "pictura/evaluation/scene_protocol.h"
 #include "pictura/map/scenario/scenario.h"
+#include "pictura/simulator/scene_protocol.h"
 
 namespace pictura {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "pictura/common/support/output_file.h"
-#include "pictura/evaluation/scene_protocol.h"
+#include "pictura/simulator/scene_protocol.h"
 
 namespace pictura {
 

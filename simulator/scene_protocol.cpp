@@ -1,4 +1,4 @@
-#include "pictura/evaluation/scene_protocol.h"
+#include "pictura/simulator/scene_protocol.h"
 
 #include <array>
 #include <cmath>
