@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pictura/common/error.h"
+#include "pictura/simulator/hash_values.h"
 #include "pictura/simulator/rules/limits.h"
 
 namespace pictura {
@@ -172,6 +173,35 @@ std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenar
   map->scenario = std::move(scenario);
   map->start_step = start_step;
   return map;
+}
+
+std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<const int32_t> tracks,
+                                               Span<const uint8_t> replayed, int num_agents) {
+  const auto count = static_cast<size_t>(num_agents);
+  if (tracks.size() > count || replayed.size() != tracks.size()) {
+    fail_usage("scene {}: expected at most {} tracks, each either driven or replayed, got {} and {}", map.scenario->id,
+               num_agents, tracks.size(), replayed.size());
+  }
+  auto result = std::make_shared<CompiledMap>(map);
+  const MapRecord& from = map.rules.record;
+  MapRecord& to = result->rules.record;
+  const auto steps = static_cast<size_t>(from.num_steps);
+  to.agents.assign(count, {});
+  to.states.assign(count * steps, {});
+  to.replayed.assign(count, 1);
+  for (size_t i = 0; i < tracks.size(); ++i) {
+    const auto track = static_cast<size_t>(tracks[i]);
+    to.agents[i] = from.agents[track];
+    to.replayed[i] = replayed[i];
+    std::copy_n(from.states.begin() + static_cast<ptrdiff_t>(track * steps), steps,
+                to.states.begin() + static_cast<ptrdiff_t>(i * steps));
+  }
+  Hash64 hash;
+  add_values(&hash, map.fingerprint, num_agents);
+  hash.add(tracks);
+  hash.add(replayed);
+  result->fingerprint = hash.value();
+  return result;
 }
 
 SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step, SimulatorConfig config) {

@@ -24,6 +24,13 @@ constexpr float kRecordedHeadAhead_m = 15.0f, kRecordedHeadHeight_m = 5.0f;
 std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenario> scenario,
                                                     const MapOptions& options = {}, int32_t start_step = 0);
 
+/// Returns a scene's map for worlds of num_agents agents or fewer, which have these tracks in this order, then agents
+/// that are never present. replayed [tracks]: 1 for tracks that follow their records whatever their commands; the
+/// others are driven. An episode ends when no driven agent drives any more if reset_inactive_fraction is 1. Throws
+/// UsageError unless num_agents is at least the number of tracks.
+std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<const int32_t> tracks,
+                                               Span<const uint8_t> replayed, int num_agents);
+
 /// Adapts a configuration to a scene: the recording's time step, its length from start_step on as the episode's, no
 /// walls, no parked cars besides its tracks, no early end, and dynamics multipliers of 1.
 SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step = 0, SimulatorConfig config = {});

@@ -93,9 +93,10 @@ void check(const SimulatorConfig& config, const CompiledMaps& maps, const std::v
     }
     const CompiledMap& map = *maps[world.map];
     if (!map.scenario) continue;
-    if (static_cast<size_t>(world.num_agents) != map.scenario->tracks.size()) {
+    const size_t recorded = map.rules.record.agents.size(), agents = static_cast<size_t>(world.num_agents);
+    if (map.rules.record.replayed.empty() ? agents != recorded : agents > recorded) {
       fail_usage("simulator: world {}: expected as many agents as scene {} has tracks, {}, got {}", world.global_world,
-                 map.scenario->id, map.scenario->tracks.size(), world.num_agents);
+                 map.scenario->id, recorded, world.num_agents);
     }
     constexpr float kSameStep = 0.01f;  // relative to the recording's step: WOMD's steps are about 0.10002 s
     if (std::abs(config.dt_s - map.scenario->dt_s) > kSameStep * map.scenario->dt_s) {

@@ -272,7 +272,7 @@ class SimulatorCpu final : public Simulator {
     for (int agent = 0; agent < world.num_agents; ++agent) {
       const int chosen = chosen_try_[world.first_slot + agent];
       place_agent(world, agent, chosen);
-      spawned += joins_episode(world, chosen);
+      spawned += joins_episode(world, agent, chosen);
     }
     worlds_.state.spawned[index] = spawned;
     sort_into_cells(world, &worlds_.box_cells[index]);

@@ -132,7 +132,7 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
   team.for_each(1, [&](int) { *spawned_out = 0; });
   team.template for_each_by_groups<kThreadsPerAgent>(world.num_agents, [&](const auto& group, int agent) {
     place_agent(world, agent, scratch.chosen_try[agent], group);
-    if (group.rank() == 0 && joins_episode(world, scratch.chosen_try[agent])) team.add(spawned_out, 1);
+    if (group.rank() == 0 && joins_episode(world, agent, scratch.chosen_try[agent])) team.add(spawned_out, 1);
   });
 }
 

@@ -153,7 +153,9 @@ struct MapView {
   GridView near_stop_lines;
   Span<const RecordedAgent> recorded_agents;  // in the order of the worlds' agents; empty without a record
   Span<const RecordedState> recorded_states;  // [recorded_agents, recorded_steps]
-  Span<const SideEdge> side_edges;            // edges of maps with a record, for road_side()
+  // [recorded_agents] 1: the agent follows its record whatever its command; empty: commands decide.
+  Span<const uint8_t> replayed_agents;
+  Span<const SideEdge> side_edges;  // edges of maps with a record, for road_side()
   GridView side_cells;
   Span<const LightState> recorded_lights;         // [stop_lines, recorded_steps]; if empty, lights follow plans
   int32_t recorded_steps = 0;                     // from the step at which episodes start
@@ -163,6 +165,14 @@ struct MapView {
 
 /// Whether the map comes from a recorded scene, whose road users are all agents of its worlds.
 PICTURA_HD inline bool has_record(const MapView& map) { return !map.recorded_agents.empty(); }
+
+/// Whether the map, rather than commands, decides which agents follow their records.
+PICTURA_HD inline bool has_replayed_agents(const MapView& map) { return !map.replayed_agents.empty(); }
+
+/// Whether an agent follows its record whatever its command.
+PICTURA_HD inline bool is_replayed(const MapView& map, int agent) {
+  return has_replayed_agents(map) && map.replayed_agents[agent] != 0;
+}
 
 /// Calls visit(&span) for every array of the view, so that arrays can be copied to another memory.
 template <typename Visit>
@@ -190,6 +200,7 @@ PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
   visit(&view->wall_middles);
   visit(&view->recorded_agents);
   visit(&view->recorded_states);
+  visit(&view->replayed_agents);
   visit(&view->recorded_lights);
   visit(&view->side_edges);
   GridView* const lists[] = {&view->segment_cells,        &view->edge_cells,       &view->wall_cells,

@@ -99,6 +99,67 @@ TEST(RecordedWorlds, StartAtAChosenStep) {
               HasSubstr("expected a start step in [0, 91), got 91"));
 }
 
+TEST(RecordedWorlds, ReplayedTracksFollowTheRecordWhateverTheirCommands) {
+  const auto scene = crossing();
+  SimulatorConfig config = scene_config(*scene);
+  config.reset_inactive_fraction = 1;
+  config.leave_at_goal = true;
+  const auto whole = compile_scenario(scene, map_options(config));
+  // Two moving vehicles drive without jerk; the others, among them a pedestrian, are replayed.
+  std::vector<int32_t> tracks;
+  for (int32_t track = 0; track < static_cast<int32_t>(scene->tracks.size()); ++track) {
+    if (is_moving(*scene, track) && scene->valid_of(track)[0] && tracks.size() < 2) tracks.push_back(track);
+  }
+  ASSERT_EQ(tracks.size(), 2u);
+  for (int32_t track = static_cast<int32_t>(scene->tracks.size()); track-- > 0;) {
+    if (track != tracks[0] && track != tracks[1]) tracks.push_back(track);
+  }
+  std::vector<uint8_t> replayed(tracks.size(), 1);
+  replayed[0] = replayed[1] = 0;
+  const int num_agents = static_cast<int>(tracks.size()) + 3;
+  const auto map = with_tracks(*whole, tracks, replayed, num_agents);
+  EXPECT_NE(map->fingerprint, whole->fingerprint);
+  EXPECT_NE(map->fingerprint,
+            with_tracks(*whole, tracks, std::vector<uint8_t>(tracks.size()), num_agents)->fingerprint);
+  const auto simulator = make_simulator("cpu", config, CompiledMaps{map}, {scene_world(*map)});
+  ASSERT_EQ(simulator->num_slots(), num_agents);
+  EXPECT_EQ(simulator->spawn_report().spawned, 2);
+  const std::vector<int32_t> actions(static_cast<size_t>(num_agents), kIdleAction);
+  int32_t step = 0;
+  for (; !simulator->episode_over()[0]; ++step) {
+    ASSERT_LT(step, config.episode_steps);
+    for (int slot = 0; slot < num_agents; ++slot) {
+      SCOPED_TRACE(::testing::Message() << "slot " << slot << ", step " << step);
+      const auto at = static_cast<size_t>(slot);
+      if (slot < 2) {
+        ASSERT_EQ(simulator->arrays().driver[at], 0);
+        continue;
+      }
+      ASSERT_EQ(simulator->arrays().driver[at], kRecordDriver);
+      const bool is_present = at < tracks.size() && scene->valid_of(tracks[at])[static_cast<size_t>(step)] != 0;
+      ASSERT_EQ(status_of(*simulator, slot), is_present ? AgentStatus::recorded : AgentStatus::absent);
+      if (!is_present) continue;
+      const TrackState& state = scene->states_of(tracks[at])[static_cast<size_t>(step)];
+      ASSERT_LT(length((simulator->scene().agents[at].center_m - state.position_m).xy()), 1e-3f);
+    }
+    const StepResult result = simulator->step(Array(actions));
+    for (int slot = 2; slot < num_agents; ++slot) {
+      ASSERT_EQ(result.valid[static_cast<size_t>(slot)], 0);
+      ASSERT_EQ(result.truncated[static_cast<size_t>(slot)] + result.terminated[static_cast<size_t>(slot)], 0);
+    }
+  }
+  EXPECT_GT(simulator->totals().agent_steps, 0);
+  EXPECT_LE(simulator->totals().agent_steps, 2 * step);
+  // The episode ended because no driven agent drives any more, or at its full length.
+  const bool any_drives =
+      status_of(*simulator, 0) == AgentStatus::active || status_of(*simulator, 1) == AgentStatus::active;
+  EXPECT_EQ(any_drives, step == config.episode_steps);
+  const auto refusal = [&](int agents) {
+    return test::message_of<UsageError>([&] { with_tracks(*whole, tracks, replayed, agents); });
+  };
+  EXPECT_THAT(refusal(4), HasSubstr("expected at most 4 tracks"));
+}
+
 std::unique_ptr<Simulator> lit_world_of(const std::shared_ptr<const Scenario>& scene, int32_t start_step = 0) {
   const SimulatorConfig config = scene_config(*scene, start_step);
   MapOptions options = map_options(config);

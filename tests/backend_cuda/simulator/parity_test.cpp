@@ -326,6 +326,24 @@ void expect_same_records(AfterInfraction after_infraction, bool leave_at_goal) {
   ASSERT_EQ(cpu->save(), cuda->save());
 }
 
+TEST_F(CudaSimulatorTest, ReplaysTracksThatTheMapChooses) {
+  const auto scene = test::crossing({.num_vehicles = 40, .num_pedestrians = 10});
+  SimulatorConfig config = scene_config(*scene);
+  config.reset_inactive_fraction = 1;
+  config.leave_at_goal = true;
+  const auto whole = compile_scenario(scene, map_options(config));
+  std::vector<int32_t> tracks(scene->tracks.size());
+  std::vector<uint8_t> replayed(tracks.size());
+  for (size_t i = 0; i < tracks.size(); ++i) {
+    tracks[i] = static_cast<int32_t>(tracks.size() - 1 - i);
+    replayed[i] = i % 3 != 0;
+  }
+  const auto num_agents = static_cast<int>(tracks.size()) + 5;
+  const CompiledMaps maps{with_tracks(*whole, tracks, replayed, num_agents), whole};
+  const std::vector<WorldSpec> worlds{{0, num_agents, 0}, {0, 20, 1}, scene_world(*whole, 1, 2)};
+  expect_parity(config, maps, worlds, 250, 25);
+}
+
 TEST_F(CudaSimulatorTest, FollowsRecordsAndTakesOver) { expect_same_records(AfterInfraction::halt, false); }
 
 TEST_F(CudaSimulatorTest, EndsAgentsAsTheRulesSay) {

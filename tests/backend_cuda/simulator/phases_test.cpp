@@ -190,6 +190,21 @@ TEST(Phases, FollowRecords) {
   expect_same(config, maps, worlds, 60, 10);  // actions alone take over all agents
 }
 
+TEST(Phases, FollowRecordsOfReplayedTracks) {
+  const auto scene = test::crossing({.num_steps = 40, .num_pedestrians = 6});
+  SimulatorConfig config = scene_config(*scene);
+  config.reset_inactive_fraction = 1;
+  config.leave_at_goal = true;
+  config.others.blind = 0.3f;
+  const auto whole = compile_scenario(scene, map_options(config));
+  const std::vector<int32_t> tracks{2, 5, 0, 9, 7, 1, 3};
+  const std::vector<uint8_t> replayed{0, 0, 0, 1, 1, 1, 0};
+  const CompiledMaps maps{with_tracks(*whole, tracks, replayed, 10), whole};
+  const std::vector<WorldSpec> worlds{{0, 10, 0}, scene_world(*whole, 1, 1), {0, 6, 2}};
+  expect_same(config, maps, worlds, 130, 12);
+  expect_same(config, maps, worlds, 60, 13, /*by_commands=*/true);
+}
+
 TEST(Phases, EndAgentsAsTheRulesSay) {
   const auto scene = test::crossing({.num_steps = 40, .num_pedestrians = 6});
   SimulatorConfig config = scene_config(*scene);
