@@ -1,5 +1,6 @@
 #include "pictura/configuration/config.h"
 
+#include "pictura/common/error.h"
 #include "pictura/common/support/numbers.h"
 #include "pictura/configuration/config_writer.h"
 #include "pictura/configuration/visit_keys.h"
@@ -35,6 +36,31 @@ bool Config::reads(ObservationPart part) const {
   return part == ObservationPart::own ||
          (policy.modality == Modality::vector && (part != ObservationPart::walls || simulator.wall_observations));
 }
+
+SceneProtocol SceneSection::training_protocol() const {
+  SceneProtocol result = scene_protocol(protocol);
+  if (!control.empty()) result.control = control;
+  for (const std::string& rule : rules) set_scene_rule(rule, &result);
+  check(result);
+  const auto refuse = [](bool is_chosen, const char* rule, const char* supported) {
+    if (is_chosen) fail_usage("rule {}: expected {} in training, which knows no other value", rule, supported);
+  };
+  refuse(result.late == Late::drive, "late", "replay or absent");
+  refuse(result.record_end != RecordEnd::stand, "record_end", "stand");
+  refuse(result.waypoints != Waypoints::goal, "waypoints", "goal");
+  return result;
+}
+
+constexpr std::string_view kScenesPrefix = "scenes:";
+
+std::optional<std::string> scene_source(const std::string& map) {
+  if (!map.starts_with(kScenesPrefix)) return std::nullopt;
+  return map.substr(kScenesPrefix.size());
+}
+
+std::string map_of_scenes(const std::string& source) { return fmt::format("{}{}", kScenesPrefix, source); }
+
+bool SimulatorSection::has_scenes() const { return !maps.empty() && scene_source(maps.front()).has_value(); }
 
 std::optional<NamedShare> parse_share(const std::string& text) {
   const size_t sign = text.rfind('=');

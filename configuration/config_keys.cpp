@@ -104,7 +104,12 @@ Config with_absolute_paths(Config config) {
     text = file + share;
   }
   for (std::string& map : config.simulator.maps) {
-    if (is_map_file(map)) make_absolute(&map);
+    if (std::optional<std::string> scenes = scene_source(map)) {
+      make_absolute(&*scenes);
+      map = map_of_scenes(*scenes);
+    } else if (is_map_file(map)) {
+      make_absolute(&map);
+    }
   }
   return config;
 }

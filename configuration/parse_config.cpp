@@ -362,6 +362,27 @@ void check_patch_changes(const Config& c, const Reader& reader) {
   }
 }
 
+// Throws for settings that worlds of recorded scenes cannot have.
+void check_scenes(const Config& c, const Reader& reader) {
+  for (const std::string& map : c.simulator.maps) {
+    const std::optional<std::string> source = scene_source(map);
+    if (!source || source->empty()) {
+      reader.throw_error("simulator.maps",
+                         fmt::format("expected recorded scenes alone, each as scenes:NAME, got '{}'", map));
+    }
+  }
+  if (c.simulator.map_copies > 0) reader.throw_error("simulator.map_copies", "expected 0 with recorded scenes");
+  if (c.train.evaluate_every > 0) {
+    reader.throw_error("train.evaluate_every",
+                       "expected 0 with recorded scenes: evaluate checkpoints with --protocol instead");
+  }
+  try {
+    c.simulator.scenes.training_protocol();
+  } catch (const UsageError& error) {
+    reader.throw_error("simulator.scenes", error.what());
+  }
+}
+
 void check_contradictions(const Config& c, const Reader& reader) {
   if (c.simulator.min_agents > c.simulator.max_agents) {
     reader.throw_error("simulator.min_agents", fmt::format("expected at most simulator.max_agents ({}), got {}",
@@ -371,6 +392,11 @@ void check_contradictions(const Config& c, const Reader& reader) {
     reader.throw_error("simulator.pedestrian_fraction",
                        fmt::format("expected at most 1 together with simulator.cyclist_fraction, got {} + {}",
                                    c.simulator.pedestrian_fraction, c.simulator.cyclist_fraction));
+  }
+  if (c.simulator.has_scenes()) {
+    check_scenes(c, reader);
+  } else if (std::any_of(c.simulator.maps.begin(), c.simulator.maps.end(), scene_source)) {
+    reader.throw_error("simulator.maps", "expected either roads or recorded scenes (scenes:NAME), got both");
   }
   const std::string policies = "simulator.others.policies";
   if (c.simulator.other_policies.size() > kMaxOtherPolicies) {
@@ -548,7 +574,12 @@ Config load_config(const std::string& path, const std::vector<std::string>& over
   }
   if (!is_overridden("simulator.maps")) {
     for (std::string& map : config.simulator.maps) {
-      if (is_map_file(map)) beside_config(&map);
+      if (std::optional<std::string> scenes = scene_source(map)) {
+        beside_config(&*scenes);
+        map = map_of_scenes(*scenes);
+      } else if (is_map_file(map)) {
+        beside_config(&map);
+      }
     }
   }
   return config;

@@ -45,6 +45,12 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.value(NamedKey{"simulator.max_agents", Evaluation::replaced}, c.simulator.max_agents, 1, kMaxAgentsPerWorld);
   visit_simulator_keys(c.simulator, v);
   v.texts(NamedKey{"simulator.others.policies", Resume::reported, Evaluation::replaced}, c.simulator.other_policies);
+  v.name(NamedKey{"simulator.scenes.protocol", Evaluation::replaced}, c.simulator.scenes.protocol,
+         scene_protocol_names());
+  v.value(NamedKey{"simulator.scenes.control", Evaluation::replaced}, c.simulator.scenes.control);
+  v.texts(NamedKey{"simulator.scenes.rules", Evaluation::replaced}, c.simulator.scenes.rules);
+  v.value(NamedKey{"simulator.scenes.updates_per_set", Resume::reported, Evaluation::replaced},
+          c.simulator.scenes.updates_per_set, 1, int64_t{1} << 40);
   for (int i = 0; i < kNumConditioning; ++i) {
     v.range(std::string("simulator.conditioning.") + kConditioningNames[i], c.simulator.conditioning[size_t(i)]);
   }

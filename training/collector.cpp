@@ -36,6 +36,11 @@ Collector::Collector(Run* run)
       records_(static_cast<size_t>(run->rollout.num_steps()) + 1),
       simulations_(static_cast<size_t>(run->rollout.num_steps())) {}
 
+void Collector::forget_worlds() {
+  for (auto* works : {&records_, &simulations_}) *works = std::vector<RepeatedWork>(works->size());
+  graphs_.release_memory();
+}
+
 bool Collector::collect() {
   bool is_complete = false;
   run_.on_stream([&] { is_complete = collect_on_stream(); });
@@ -60,7 +65,7 @@ bool Collector::collect_on_stream() {
     repeat_held_actions(step, slots);
     run_.executor->choose_actions(simulator.arrays(), span_of<const int64_t>(slots),
                                   span_of<const float>(decision.log_probs),
-                                  {.argmax = false, .seed = run_.config.run.seed}, rollout.actions_at(step), stream);
+                                  {.argmax = false, .seed = simulator.config().seed}, rollout.actions_at(step), stream);
     const at::Tensor chosen = rollout.actions.select(0, step).index_select(0, slots).to(at::kLong).unsqueeze(1);
     rollout.values.select(0, step).index_copy_(0, slots, decision.value);
     rollout.log_probs.select(0, step).index_copy_(0, slots, decision.log_probs.gather(1, chosen).squeeze(1));
@@ -81,7 +86,7 @@ bool Collector::collect_on_stream() {
 at::Tensor Collector::record(int64_t step) {
   RolloutObservations& observations = run_.rollout.observations;
   const SimulatorArrays input = run_.simulator->arrays();
-  const at::Tensor own = run_.opponents ? run_.opponents->own_slots(input) : at::Tensor();
+  const at::Tensor own = run_.opponents || run_.scenes ? own_slots(input) : at::Tensor();
   const Span<const uint8_t> mask = own.defined() ? span_of<const uint8_t>(own) : Span<const uint8_t>();
   const at::Tensor slots = clock_.select_deciding(input, active_slots(input, mask, true, run_.executor.get()), step,
                                                   run_.simulator->episode_over());

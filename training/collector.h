@@ -16,6 +16,8 @@ class Collector {
   /// Fills the run's rollout, except advantages. Returns false after an interrupt (^C); with several ranks the
   /// interrupt takes effect after the update.
   bool collect();
+  /// Releases graphs of the simulator's previous worlds.
+  void forget_worlds();
 
   /// Graph launches of all steps so far.
   int64_t num_graph_launches() const { return graphs_.num_launches(); }

@@ -50,6 +50,7 @@ class TrainingLoop {
     evaluate_if_due();
     while (has_more_updates()) {
       UpdateRecord record;
+      exchange_scenes();
       if (!collect(&record)) return;
       update_policy(&record);
       count(record);
@@ -76,6 +77,12 @@ class TrainingLoop {
     if (run_.update >= train.updates || schedule_has_ended(train, run_.agent_steps)) return false;
     is_out_of_time_ = time_.would_exceed_limit(RunWork::update);
     return !is_out_of_time_;
+  }
+
+  void exchange_scenes() {
+    if (run_.exchange_scenes()) collector_.forget_worlds();
+    if (!run_.scenes) return;
+    for (const std::string& notice : run_.scenes->take_notices()) options_.notify(notice);
   }
 
   // Collects a rollout. Returns false after an interrupt; the run's state is then that of the rollout's start, from

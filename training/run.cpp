@@ -31,11 +31,26 @@ std::unique_ptr<Opponents> make_opponents(const Config& config, Device device, C
   return std::make_unique<Opponents>(config, device, communicator);
 }
 
-std::unique_ptr<Simulator> make_training_simulator(const Config& config, Device device, const Teacher* teacher,
-                                                   const Opponents* opponents, std::vector<WorldSpec> worlds) {
-  SimulatorConfig world = simulator_config(config, device);
+SimulatorConfig observed_world(const Config& config, Device device, const Teacher* teacher,
+                               const Opponents* opponents) {
+  SimulatorConfig world = training_world(config, device);
   if (teacher) teacher->add_arrays(&world);
   if (opponents) opponents->add_arrays(&world);
+  return world;
+}
+
+std::unique_ptr<SceneSets> make_scene_sets(const Config& config, const SimulatorConfig& world,
+                                           std::vector<WorldSpec> worlds, size_t num_all_worlds) {
+  if (!config.simulator.has_scenes()) return nullptr;
+  return std::make_unique<SceneSets>(config, world, std::move(worlds), static_cast<int>(num_all_worlds));
+}
+
+std::unique_ptr<Simulator> make_training_simulator(const Config& config, const SimulatorConfig& world,
+                                                   SceneSets* scenes, std::vector<WorldSpec> worlds) {
+  if (scenes) {
+    SceneSet first = scenes->take(0);
+    return make_simulator(config.simulator.backend, world, std::move(first.maps), std::move(first.worlds));
+  }
   return make_simulator(config.simulator.backend, world, load_maps(training_maps(config), config.run.num_threads),
                         std::move(worlds));
 }
@@ -67,7 +82,10 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
       rig(rig_of(config)),
       teacher(make_teacher(config, device, communicator)),
       opponents(make_opponents(config, device, communicator)),
-      simulator(make_training_simulator(config, device, teacher.get(), opponents.get(),
+      world(observed_world(config, device, teacher.get(), opponents.get())),
+      scenes(make_scene_sets(config, world, worlds_in_part(all_worlds, communicator->rank(), communicator->size()),
+                             all_worlds.size())),
+      simulator(make_training_simulator(config, world, scenes.get(),
                                         worlds_in_part(all_worlds, communicator->rank(), communicator->size()))),
       renderer(make_training_renderer(config, rig, *simulator)),
       executor(make_learner_executor(device)),
@@ -125,7 +143,9 @@ Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
     checkpoint.averaged_updates = average->updates;
   }
   checkpoint.simulator = simulator->save();
-  if (communicator->size() > 1) {
+  if (communicator->size() > 1 && scenes) {
+    checkpoint.simulator.clear();  // no rank has the scenes of all
+  } else if (communicator->size() > 1) {
     const std::vector<std::vector<uint8_t>> parts = communicator->gather(checkpoint.simulator);
     checkpoint.simulator.clear();
     if (communicator->is_first()) checkpoint.simulator = join_saved_states(*simulator, all_worlds, parts);
@@ -183,6 +203,23 @@ void Run::restore_rate_factors(const SavedPolicy& saved) {
   PICTURA_CHECK(left.empty(), "{}: rate_factors: the policy has no parameter '{}'", saved.path, left.begin()->first);
 }
 
+bool Run::exchange_scenes() {
+  if (!scenes || scenes->set_after(update) == scene_set) return false;
+  enter_scenes(scenes->set_after(update));
+  return true;
+}
+
+void Run::enter_scenes(int64_t set) {
+  if (set == scene_set) return;
+  SceneSet next = scenes->take(set);
+  on_stream([&] {
+    simulator->set_worlds(std::move(next.maps), {}, std::move(next.worlds), next.seed, current_stream(device));
+  });
+  scene_set = set;
+  if (renderer) upload_maps(*simulator, renderer.get());
+  if (opponents) opponents->enter(*simulator);
+}
+
 ImageSize Run::image_size() const {
   return renderer ? ImageSize{rig.cameras[0].width_px, rig.cameras[0].height_px} : ImageSize{};
 }
@@ -231,8 +268,10 @@ std::string Run::restore(const Checkpoint& saved) {
   update = saved.update;
   distance_m = saved.distance_m;
   longest_update_s = saved.longest_update_s;
+  if (scenes) enter_scenes(scenes->set_after(std::max<int64_t>(update - 1, 0)));
   std::string why_new_episodes;
   try {
+    PICTURA_CHECK(communicator->size() == 1 || !scenes, "recorded scenes on several ranks");
     if (communicator->size() == 1) {
       simulator->restore(saved.simulator);
     } else {

@@ -10,6 +10,7 @@
 #include "pictura/training/opponents.h"
 #include "pictura/training/ppo.h"
 #include "pictura/training/ranks/communicator.h"
+#include "pictura/training/scene_sets.h"
 #include "pictura/training/teacher.h"
 #include "pictura/training/weight_average.h"
 
@@ -47,6 +48,9 @@ struct Run {
   /// Switches to the image size that render.schedule has for the completed agent-steps, and spreads the first
   /// convolution if its patches grow. Returns a sentence that describes the change, or an empty text.
   std::string update_image_size();
+  /// Replaces recorded scenes by those that are due after the completed updates; returns whether it did. All worlds
+  /// then begin new episodes, and graphs of the previous worlds are stale.
+  bool exchange_scenes();
   /// Current size of the first camera's images; 0 without images.
   ImageSize image_size() const;
 
@@ -58,6 +62,8 @@ struct Run {
   Rig rig;                                       // current rig
   const std::unique_ptr<const Teacher> teacher;  // null without train.teacher
   const std::unique_ptr<Opponents> opponents;    // null without simulator.others.policies
+  const SimulatorConfig world;                   // of all worlds
+  const std::unique_ptr<SceneSets> scenes;       // null without recorded scenes
   const std::unique_ptr<Simulator> simulator;
   std::unique_ptr<Renderer> renderer;  // null for policies without images
   const std::unique_ptr<LearnerExecutor> executor;
@@ -70,6 +76,7 @@ struct Run {
   const std::optional<OwnStream> stream;  // only with graphs
   Graphs graphs;                          // graphs of `chunks`
   ChunkRunner chunks;
+  int64_t scene_set = 0;    // set of recorded scenes in the worlds
   int64_t update = 0;       // completed updates
   int64_t agent_steps = 0;  // agent-steps of the completed updates
   double distance_m = 0;    // distance driven by all agents in the completed updates
@@ -78,6 +85,8 @@ struct Run {
   std::map<std::string, double> longest_update_s;
 
  private:
+  /// Replaces the worlds' scenes by those of a set.
+  void enter_scenes(int64_t set);
   /// Sets the rate factors of parameters from a saved policy, and all others to 1.
   void restore_rate_factors(const SavedPolicy& saved);
 };

@@ -7,6 +7,7 @@
 namespace pictura {
 
 RunEvaluation::RunEvaluation(const Run& run) : run_(run) {
+  if (run.config.simulator.has_scenes()) return;  // parse_config() refuses evaluations
   // Copies follow the maps themselves.
   const CompiledMaps& maps = run.simulator->maps();
   worlds_.maps.assign(maps.begin(), maps.begin() + static_cast<ptrdiff_t>(run.config.simulator.maps.size()));

@@ -9,8 +9,12 @@
 
 namespace pictura {
 
-/// Draws the worlds that fill simulator.num_slots, over all ranks; training_maps() has the map of each.
+/// Draws the worlds that fill simulator.num_slots, over all ranks; training_maps() has the map of each. Worlds of
+/// recorded scenes have simulator.max_agents agents each; SceneSets has their maps.
 std::vector<WorldSpec> draw_training_worlds(const Config& config);
+
+/// Configuration of those worlds: simulator_config(), and for recorded scenes their protocol's.
+SimulatorConfig training_world(const Config& config, Device device);
 
 /// Maps of those worlds, as load_maps() takes them: simulator.maps, then their copies (simulator.map_copies), without
 /// copies that no world uses.

@@ -74,6 +74,39 @@ TEST(Config, NumbersMayBeWrittenInAnyDecimalNotation) {
   }
 }
 
+TEST(Config, RecordedScenesHaveSettingsOfTheirOwn) {
+  const auto config_of = [](const std::string& maps, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> overrides = more;
+    overrides.push_back("simulator.maps=[" + maps + "]");
+    return parse_config("", "scenes.toml", overrides);
+  };
+  const Config config = config_of(R"("scenes:a", "scenes:b#3")",
+                                  {"simulator.scenes.control=self", R"(simulator.scenes.rules=["box_scale=1"])"});
+  ASSERT_TRUE(config.simulator.has_scenes());
+  EXPECT_FALSE(Config().simulator.has_scenes());
+  const SceneProtocol protocol = config.simulator.scenes.training_protocol();
+  EXPECT_EQ(protocol.name, "gpudrive");
+  EXPECT_EQ(protocol.control, "self");
+  EXPECT_EQ(protocol.box_scale, 1);
+  EXPECT_EQ(scene_source("scenes:a"), "a");
+  EXPECT_EQ(scene_source("Town01"), std::nullopt);
+  EXPECT_TRUE(with_absolute_paths(config).simulator.maps[0].starts_with("scenes:/"));
+  EXPECT_EQ(to_toml(parse_config(to_toml(config), "again")), to_toml(config));
+  const auto refusal = [&](const std::string& maps, const std::vector<std::string>& more = {}) {
+    return test::message_of<Error>([&] { config_of(maps, more); });
+  };
+  const std::string scenes = R"("scenes:a")";
+  EXPECT_THAT(refusal(R"("scenes:a", "Town01")"), HasSubstr("simulator.maps: expected recorded scenes alone"));
+  EXPECT_THAT(refusal(R"("Town01", "scenes:a")"), HasSubstr("simulator.maps: expected either roads or recorded"));
+  EXPECT_THAT(refusal(R"("scenes:")"), HasSubstr("each as scenes:NAME, got 'scenes:'"));
+  EXPECT_THAT(refusal(scenes, {"simulator.map_copies=1"}), HasSubstr("simulator.map_copies: expected 0"));
+  EXPECT_THAT(refusal(scenes, {"train.evaluate_every=1"}), HasSubstr("train.evaluate_every: expected 0"));
+  EXPECT_THAT(refusal(scenes, {"simulator.scenes.protocol=wosac"}), HasSubstr("gpudrive"));
+  EXPECT_THAT(refusal(scenes, {"simulator.scenes.control=cars"}), HasSubstr("got 'cars'"));
+  EXPECT_THAT(refusal(scenes, {R"(simulator.scenes.rules=["late=drive"])"}),
+              HasSubstr("simulator.scenes: rule late: expected replay or absent"));
+}
+
 TEST(Config, UnknownKeysSuggestTheNearest) {
   EXPECT_THAT(error_in("", {"train.updats=1"}), HasSubstr("did you mean 'train.updates'?"));
   EXPECT_THAT(error_in("", {"train.precision=bf61"}), HasSubstr("got 'bf61'; did you mean 'bf16'?"));

@@ -1,0 +1,74 @@
+// Recorded scenes as training worlds: which scenes the worlds show, and their preparation while training continues.
+#pragma once
+
+#include <future>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "pictura/configuration/config.h"
+#include "pictura/map/scenario/load_scenario.h"
+#include "pictura/simulator/scene_protocol.h"
+#include "pictura/simulator/simulator.h"
+
+namespace pictura {
+
+/// Compiles a scene for worlds of num_agents agents. Roles, starts and goals are those of evaluations
+/// (evaluation/scene_plan.h): the driven tracks come first, then the replayed ones. If there are more tracks than
+/// agents, the replayed ones farthest from driven ones are left out. `config` is that of the worlds. Returns null where
+/// the protocol lets no road user be driven. Throws Error for scenes that cannot be read or simulated.
+std::shared_ptr<const CompiledMap> compile_training_scene(const SceneRef& scene, const SceneProtocol& protocol,
+                                                          SimulatorConfig config, int num_agents);
+
+/// Maps and worlds of one set of scenes.
+struct SceneSet {
+  CompiledMaps maps;
+  std::vector<WorldSpec> worlds;
+  uint64_t seed = 0;  // of the set's episodes
+};
+
+/// Sets of scenes that the worlds of a run show in turn. World w of set k shows scene k W + w, where W is the number of
+/// worlds over all ranks and scenes are counted again and again from the first. Scenes that cannot be used are replaced
+/// by the next one that can. The host holds two sets: the current one, and the next, which is prepared in the
+/// background.
+class SceneSets {
+ public:
+  /// Finds the scenes of simulator.maps. `worlds` are those of this rank, whose maps are ignored; `world` is their
+  /// configuration. Throws Error where there is no scene.
+  SceneSets(const Config& config, const SimulatorConfig& world, std::vector<WorldSpec> worlds, int num_all_worlds);
+  ~SceneSets();
+  SceneSets(const SceneSets&) = delete;
+  SceneSets& operator=(const SceneSets&) = delete;
+
+  /// Number of the set that worlds show after this number of updates.
+  int64_t set_after(int64_t updates) const { return updates / updates_per_set_; }
+  /// Returns a set, waiting until it is prepared, and begins to prepare the next one. Throws Error where no scene can
+  /// be used.
+  SceneSet take(int64_t number);
+  /// Messages about scenes that are left out, since the last call.
+  std::vector<std::string> take_notices();
+
+ private:
+  using Maps = std::map<size_t, std::shared_ptr<const CompiledMap>>;  // by the number of the scene
+
+  SceneSet make(int64_t number);
+  std::shared_ptr<const CompiledMap> compile(size_t scene, std::string* fault_out) const;
+
+  const SceneProtocol protocol_;
+  const SimulatorConfig world_;
+  const std::vector<WorldSpec> worlds_;
+  const uint64_t seed_;
+  const int64_t num_all_worlds_, updates_per_set_;
+  const int num_agents_, num_threads_;
+  std::vector<SceneRef> scenes_;
+  std::vector<std::string> notices_;
+  // Members of the thread that prepares.
+  Maps maps_;                  // of the last prepared set
+  std::set<size_t> unusable_;  // scenes
+  std::vector<std::string> new_notices_;
+  int64_t next_number_ = -1;
+  std::future<SceneSet> next_;  // set next_number_, if valid
+};
+
+}  // namespace pictura
