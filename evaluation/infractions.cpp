@@ -87,7 +87,6 @@ const char* to_string(CollisionPartner partner) {
   constexpr const char* kNames[] = {"", "vehicle", "cyclist", "pedestrian", "parked car"};
   return kNames[static_cast<size_t>(partner)];
 }
-const char* to_string(AgentClass agent_class) { return to_string(partner_of(agent_class)); }
 
 const char* to_string(PartnerMotion motion) {
   constexpr const char* kNames[] = {"", "moving", "standing", "halted"};

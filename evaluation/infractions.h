@@ -21,7 +21,15 @@ enum class Contact : uint8_t { none, rear_end, side_swipe, crossing, head_on };
 enum class RoadShape : uint8_t { no_lane, straight, curve, junction_straight, junction_left, junction_right };
 
 const char* to_string(CollisionPartner partner);
-const char* to_string(AgentClass agent_class);
+/// Defined here, so that reports need nothing else of this file.
+inline const char* to_string(AgentClass agent_class) {
+  switch (agent_class) {
+    case AgentClass::vehicle: return "vehicle";
+    case AgentClass::cyclist: return "cyclist";
+    case AgentClass::pedestrian: return "pedestrian";
+  }
+  return "";
+}
 const char* to_string(PartnerMotion motion);
 const char* to_string(Contact contact);
 const char* to_string(RoadShape shape);
