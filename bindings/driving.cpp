@@ -16,6 +16,7 @@
 #include "pictura/bindings/objects.h"
 #include "pictura/bindings/options.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/json_text.h"
 #include "pictura/driving/replay_cases.h"
 #include "pictura/evaluation/evaluate.h"
 #include "pictura/evaluation/evaluate_scenes.h"
@@ -159,6 +160,7 @@ void visit_options(SceneArguments& arguments, Visitor&& v) {
   v.value({"num_scenes"}, options.num_scenes);
   visit_options(static_cast<DriverOptions&>(options), v);
   v.value({"rollouts"}, arguments.rollouts);
+  v.value({"realism"}, options.realism);
   v.callback({"on_progress"}, options.on_progress);
 }
 
@@ -476,7 +478,11 @@ Examples:
         const SceneEvaluation evaluation = run_interruptible("evaluate_scenes", options.num_threads, {},
                                                              [&options] { return pictura::evaluate_scenes(options); });
         if (file) file->commit();
-        return dict_of(evaluation, agents);
+        py::dict result = dict_of(evaluation, agents);
+        if (!options.realism.empty()) {
+          result["realism"] = py::module_::import("json").attr("loads")(json_text(realism_json(evaluation.realism)));
+        }
+        return result;
       },
       R"(Runs the paper's zero-shot evaluation in recorded scenes, like `pictura evaluate --protocol`.
 
@@ -484,11 +490,11 @@ checkpoint: a policy's; '' with a controller: 'log', 'inverse', 'idm', 'idm_lane
 scenes: files, folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents';
 control, start_step, steps, densities (shares of road users that remain) and rules (values by name,
 docs/explanation/evaluation.md) replace the protocol's settings. first_scene, num_scenes: range of the scenes; 0: all from the
-first on. rollouts: file of the rollouts, with the protocol 'simagents', in the format of the Waymo sim-agents challenge. The
-others as in evaluate().
+first on. rollouts: file of the rollouts, with the protocol 'simagents', in the format of the Waymo sim-agents challenge. realism:
+'2024' or '2025' scores these rollouts (docs/explanation/realism.md), with or without a file. The others as in evaluate().
 Returns a dict: rows, one per density, with each metric as (value, half of its 95 % interval); agents, one for every driven road
-user of a scene, density and rollout; scenes, scored, without_drivers, faults (skipped scenes, with reasons); seconds,
-agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error if no scene can be used.
+user of a scene, density and rollout; realism, if asked for, as pictura.realism.score_file() returns it; scenes, scored,
+without_drivers, faults (skipped scenes, with reasons); seconds, agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error if no scene can be used.
 
 Examples:
     >>> results = pictura.evaluate_scenes('models/vector.safetensors', ['validation'])   # doctest: +SKIP

@@ -110,7 +110,7 @@ def evaluate_robust(checkpoint: str, *, controller: str | collections.abc.Callab
         >>> report['pooled']['towns']['km_per_infraction']                                   # doctest: +SKIP
         (0.8, 0.2)
     """
-def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, protocol: str = 'womd', controller: str | collections.abc.Callable = '', control: str | None = None, start_step: typing.SupportsInt | typing.SupportsIndex | None = None, steps: typing.SupportsInt | typing.SupportsIndex | None = None, densities: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: dict = {}, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, num_scenes: typing.SupportsInt | typing.SupportsIndex = 0, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, rollouts: str = '', on_progress: typing.Any = None) -> dict:
+def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, protocol: str = 'womd', controller: str | collections.abc.Callable = '', control: str | None = None, start_step: typing.SupportsInt | typing.SupportsIndex | None = None, steps: typing.SupportsInt | typing.SupportsIndex | None = None, densities: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: dict = {}, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, num_scenes: typing.SupportsInt | typing.SupportsIndex = 0, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, rollouts: str = '', realism: str = '', on_progress: typing.Any = None) -> dict:
     """
     Runs the paper's zero-shot evaluation in recorded scenes, like `pictura evaluate --protocol`.
     
@@ -118,11 +118,11 @@ def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, p
     scenes: files, folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents';
     control, start_step, steps, densities (shares of road users that remain) and rules (values by name,
     docs/explanation/evaluation.md) replace the protocol's settings. first_scene, num_scenes: range of the scenes; 0: all from the
-    first on. rollouts: file of the rollouts, with the protocol 'simagents', in the format of the Waymo sim-agents challenge. The
-    others as in evaluate().
+    first on. rollouts: file of the rollouts, with the protocol 'simagents', in the format of the Waymo sim-agents challenge. realism:
+    '2024' or '2025' scores these rollouts (docs/explanation/realism.md), with or without a file. The others as in evaluate().
     Returns a dict: rows, one per density, with each metric as (value, half of its 95 % interval); agents, one for every driven road
-    user of a scene, density and rollout; scenes, scored, without_drivers, faults (skipped scenes, with reasons); seconds,
-    agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error if no scene can be used.
+    user of a scene, density and rollout; realism, if asked for, as pictura.realism.score_file() returns it; scenes, scored,
+    without_drivers, faults (skipped scenes, with reasons); seconds, agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error if no scene can be used.
     
     Examples:
         >>> results = pictura.evaluate_scenes('models/vector.safetensors', ['validation'])   # doctest: +SKIP

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import pictura
-from pictura import _load_training
+from pictura import _load_training, realism
 
 if not _load_training.usable_torch():
     pytest.skip("built without the torch that is installed", allow_module_level=True)
@@ -550,9 +550,12 @@ def test_a_controller_is_evaluated_in_recorded_scenes(tmp_path):
     assert report["scored"] == 1 and report["faults"] == [] and row["vehicle_episodes"] == len(report["agents"]) > 0
     assert report["agents"][0]["scenario_id"] == "fixture00000001" and report["agents"][0]["driven_steps"] > 0
     rollouts = tmp_path / "rollouts.binproto"
-    options = {"controller": "random", "device": "cpu", "protocol": "simagents", "rollouts": str(rollouts)}
+    options = {"controller": "random", "device": "cpu", "protocol": "simagents", "rollouts": str(rollouts), "realism": "2024"}
     report = pictura.evaluate_scenes("", [str(tmp_path / "womd.tfrecord")], **options)
     assert {agent["rollout"] for agent in report["agents"]} == set(range(32)) and rollouts.stat().st_size > 32 * 12 * 4 * 320
+    assert report["realism"] == realism.score_file(rollouts, str(tmp_path / "womd.tfrecord"), version="2024")
+    with pytest.raises(pictura.UsageError, match="expected 2024 or 2025, got '2023'"):
+        pictura.evaluate_scenes("", [str(tmp_path)], **(options | {"realism": "2023"}))
     with pytest.raises(pictura.UsageError, match="expected 32 rollouts of 80 steps"):
         pictura.evaluate_scenes("", [str(tmp_path)], controller="idm", rollouts=str(rollouts))
     with pytest.raises(pictura.UsageError, match="rule late: expected replay, drive, absent, got 'never'"):
