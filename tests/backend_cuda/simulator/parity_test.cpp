@@ -341,7 +341,8 @@ TEST_F(CudaSimulatorTest, ReplaysTracksThatTheMapChooses) {
   const auto num_agents = static_cast<int>(tracks.size()) + 5;
   const CompiledMaps maps{with_tracks(*whole, tracks, replayed, num_agents), whole};
   const std::vector<WorldSpec> worlds{{0, num_agents, 0}, {0, 20, 1}, scene_world(*whole, 1, 2)};
-  expect_parity(config, maps, worlds, 250, 25);
+  const auto cpu = make_simulator("cpu", config, maps, worlds), cuda = make_simulator("cuda", config, maps, worlds);
+  run_same(cpu.get(), cuda.get(), 250, 25);
 }
 
 TEST_F(CudaSimulatorTest, FollowsRecordsAndTakesOver) { expect_same_records(AfterInfraction::halt, false); }
