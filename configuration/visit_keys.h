@@ -49,6 +49,8 @@ void visit(AnyConfig& c, Visitor&& v) {
          scene_protocol_names());
   v.value(NamedKey{"simulator.scenes.control", Evaluation::replaced}, c.simulator.scenes.control);
   v.texts(NamedKey{"simulator.scenes.rules", Evaluation::replaced}, c.simulator.scenes.rules);
+  v.value(NamedKey{"simulator.scenes.max_replayed", Evaluation::replaced}, c.simulator.scenes.max_replayed, 0,
+          kMaxAgentsPerWorld);
   v.value(NamedKey{"simulator.scenes.updates_per_set", Resume::reported, Evaluation::replaced},
           c.simulator.scenes.updates_per_set, 1, int64_t{1} << 40);
   for (int i = 0; i < kNumConditioning; ++i) {

@@ -593,9 +593,9 @@ MapView MapRules::view() const {
   view.near_stop_lines = near_stop_lines.view();
   view.recorded_agents = record.agents;
   view.recorded_states = record.states;
-  view.replayed_agents = record.replayed;
   view.recorded_lights = record.light_states;
   view.recorded_steps = record.num_steps;
+  view.first_replayed = record.first_replayed;
   view.side_edges = sides.edges;
   view.side_cells = sides.cells.view();
   view.max_box_radius_m = max_box_radius_m;

@@ -29,9 +29,9 @@ struct CellLists {
 struct MapRecord {
   std::vector<RecordedAgent> agents;
   std::vector<RecordedState> states;     // [agents, steps]
-  std::vector<uint8_t> replayed;         // [agents] 1: follows its record whatever its command; empty: commands decide
   std::vector<LightState> light_states;  // [lights of the map, steps], or empty
   int32_t num_steps = 0;
+  int32_t first_replayed = 0;  // see MapView
   float dt_s = 0.1f;
 };
 

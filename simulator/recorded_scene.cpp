@@ -175,30 +175,32 @@ std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenar
   return map;
 }
 
-std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<const int32_t> tracks,
-                                               Span<const uint8_t> replayed, int num_agents) {
-  const auto count = static_cast<size_t>(num_agents);
-  if (tracks.size() > count || replayed.size() != tracks.size()) {
-    fail_usage("scene {}: expected at most {} tracks, each either driven or replayed, got {} and {}", map.scenario->id,
-               num_agents, tracks.size(), replayed.size());
+std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<const int32_t> driven,
+                                               Span<const int32_t> replayed, int num_agents) {
+  const auto first_replayed = static_cast<size_t>(num_agents);
+  if (driven.empty() || driven.size() > first_replayed) {
+    fail_usage("scene {}: expected 1 to {} driven tracks, got {}", map.scenario->id, num_agents, driven.size());
   }
   auto result = std::make_shared<CompiledMap>(map);
   const MapRecord& from = map.rules.record;
   MapRecord& to = result->rules.record;
   const auto steps = static_cast<size_t>(from.num_steps);
-  to.agents.assign(count, {});
-  to.states.assign(count * steps, {});
-  to.replayed.assign(count, 1);
-  for (size_t i = 0; i < tracks.size(); ++i) {
-    const auto track = static_cast<size_t>(tracks[i]);
-    to.agents[i] = from.agents[track];
-    to.replayed[i] = replayed[i];
-    std::copy_n(from.states.begin() + static_cast<ptrdiff_t>(track * steps), steps,
-                to.states.begin() + static_cast<ptrdiff_t>(i * steps));
-  }
+  to.first_replayed = num_agents;
+  to.agents.assign(first_replayed + replayed.size(), {});
+  to.states.assign(to.agents.size() * steps, {});
+  const auto take = [&](Span<const int32_t> tracks, size_t first) {
+    for (size_t i = 0; i < tracks.size(); ++i) {
+      const auto track = static_cast<size_t>(tracks[i]);
+      to.agents[first + i] = from.agents[track];
+      std::copy_n(from.states.begin() + static_cast<ptrdiff_t>(track * steps), steps,
+                  to.states.begin() + static_cast<ptrdiff_t>((first + i) * steps));
+    }
+  };
+  take(driven, 0);
+  take(replayed, first_replayed);
   Hash64 hash;
-  add_values(&hash, map.fingerprint, num_agents);
-  hash.add(tracks);
+  add_values(&hash, map.fingerprint, num_agents, driven.size());
+  hash.add(driven);
   hash.add(replayed);
   result->fingerprint = hash.value();
   return result;

@@ -24,12 +24,12 @@ constexpr float kRecordedHeadAhead_m = 15.0f, kRecordedHeadHeight_m = 5.0f;
 std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenario> scenario,
                                                     const MapOptions& options = {}, int32_t start_step = 0);
 
-/// Returns a scene's map for worlds of num_agents agents or fewer, which have these tracks in this order, then agents
-/// that are never present. replayed [tracks]: 1 for tracks that follow their records whatever their commands; the
-/// others are driven. An episode ends when no driven agent drives any more if reset_inactive_fraction is 1. Throws
-/// UsageError unless num_agents is at least the number of tracks.
-std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<const int32_t> tracks,
-                                               Span<const uint8_t> replayed, int num_agents);
+/// Returns a scene's map for worlds of num_agents agents or fewer, which are the driven tracks in this order, then
+/// agents that are never present. The replayed tracks are no agents: they are the first of the worlds' other boxes, of
+/// which there are SimulatorConfig::parked_cars, and follow their records. An episode of such a world has only agents
+/// that are present at its start. Throws UsageError unless 1 <= driven.size() <= num_agents.
+std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<const int32_t> driven,
+                                               Span<const int32_t> replayed, int num_agents);
 
 /// Adapts a configuration to a scene: the recording's time step, its length from start_step on as the episode's, no
 /// walls, no parked cars besides its tracks, no early end, and dynamics multipliers of 1.

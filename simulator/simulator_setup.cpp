@@ -93,10 +93,12 @@ void check(const SimulatorConfig& config, const CompiledMaps& maps, const std::v
     }
     const CompiledMap& map = *maps[world.map];
     if (!map.scenario) continue;
-    const size_t recorded = map.rules.record.agents.size(), agents = static_cast<size_t>(world.num_agents);
-    if (map.rules.record.replayed.empty() ? agents != recorded : agents > recorded) {
-      fail_usage("simulator: world {}: expected as many agents as scene {} has tracks, {}, got {}", world.global_world,
-                 map.scenario->id, recorded, world.num_agents);
+    const MapRecord& record = map.rules.record;
+    const auto num_tracks = static_cast<int>(record.agents.size());
+    if (record.first_replayed > 0 ? world.num_agents > record.first_replayed : world.num_agents != num_tracks) {
+      fail_usage("simulator: world {}: expected {} {} agents, as scene {} has tracks, got {}", world.global_world,
+                 record.first_replayed > 0 ? "at most" : "exactly",
+                 record.first_replayed > 0 ? record.first_replayed : num_tracks, map.scenario->id, world.num_agents);
     }
     constexpr float kSameStep = 0.01f;  // relative to the recording's step: WOMD's steps are about 0.10002 s
     if (std::abs(config.dt_s - map.scenario->dt_s) > kSameStep * map.scenario->dt_s) {
@@ -228,6 +230,10 @@ SimulatorSetup SimulatorSetup::with(CompiledMaps other_maps, std::vector<Geometr
 
 bool SimulatorSetup::has_lives() const {
   return std::any_of(maps.begin(), maps.end(), [](const auto& map) { return map->rules.is_open; });
+}
+
+bool SimulatorSetup::has_replayed_tracks() const {
+  return std::any_of(maps.begin(), maps.end(), [](const auto& map) { return map->rules.record.first_replayed > 0; });
 }
 
 void SimulatorSetup::reserve(const SimulatorCapacity& capacity) {

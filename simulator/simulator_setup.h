@@ -30,6 +30,8 @@ struct SimulatorSetup : SimulatorParts {
   const CompiledMap& map_of(int world) const { return *maps[worlds[world].map]; }
   /// Whether any map has roads that end, so that agents have lives.
   bool has_lives() const;
+  /// Whether any map has replayed tracks.
+  bool has_replayed_tracks() const;
   SimulatorCapacity needs() const { return capacity_of(maps, worlds); }
   /// Allocates for this capacity, so that assigning another setup within it moves no array.
   void reserve(const SimulatorCapacity& capacity);

@@ -86,7 +86,7 @@ bool Collector::collect_on_stream() {
 at::Tensor Collector::record(int64_t step) {
   RolloutObservations& observations = run_.rollout.observations;
   const SimulatorArrays input = run_.simulator->arrays();
-  const at::Tensor own = run_.opponents || run_.scenes ? own_slots(input) : at::Tensor();
+  const at::Tensor own = run_.opponents ? run_.opponents->own_slots(input) : at::Tensor();
   const Span<const uint8_t> mask = own.defined() ? span_of<const uint8_t>(own) : Span<const uint8_t>();
   const at::Tensor slots = clock_.select_deciding(input, active_slots(input, mask, true, run_.executor.get()), step,
                                                   run_.simulator->episode_over());

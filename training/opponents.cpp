@@ -75,7 +75,9 @@ void Opponents::enter(const Simulator& simulator) {
   }
 }
 
-at::Tensor own_slots(const SimulatorArrays& input) { return driver_of_slots(input).eq(0).to(at::kByte); }
+at::Tensor Opponents::own_slots(const SimulatorArrays& input) const {
+  return driver_of_slots(input).eq(0).to(at::kByte);
+}
 
 Span<const Command> Opponents::commands(const SimulatorArrays& input, Span<const int32_t> own_actions,
                                         PolicyExecutor* executor) {

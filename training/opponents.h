@@ -13,10 +13,6 @@
 
 namespace pictura {
 
-/// Mask of the agents that the learner drives after the simulator's last step, u8 [slots]: neither opponents nor road
-/// users that follow a recording drive them.
-at::Tensor own_slots(const SimulatorArrays& input);
-
 class Opponents {
  public:
   /// Creates the opponents of simulator.others.policies, on `device`, with the precision of the run. Throws Error
@@ -32,6 +28,8 @@ class Opponents {
   /// Prepares to drive in the run's simulator, which must outlive this object.
   void enter(const Simulator& simulator);
 
+  /// Mask of the agents that the learner drives after the simulator's last step, u8 [slots].
+  at::Tensor own_slots(const SimulatorArrays& input) const;
   /// Returns the commands of all agents, [slots]: `own_actions` [slots], replaced by the opponents' draws for their
   /// agents. A later call overwrites the result. On a device waits for the number of agents of each opponent.
   Span<const Command> commands(const SimulatorArrays& input, Span<const int32_t> own_actions, PolicyExecutor* executor);

@@ -58,6 +58,8 @@ std::shared_ptr<const CompiledMap> compile_training_scene(const SceneRef& scene,
   const std::shared_ptr<const CompiledMap> map =
       compile_scenario(protocol_scene(load_scenario(scene), protocol), options, protocol.start_step);
   if (!has_drivers(*map, protocol)) return nullptr;
+  const auto max_replayed = static_cast<size_t>(config.parked_cars);
+  config.parked_cars = 0;
   config.device = {};
   config.num_threads = 1;
   config.vector_observations = false;
@@ -65,22 +67,18 @@ std::shared_ptr<const CompiledMap> compile_training_scene(const SceneRef& scene,
   SceneProtocol fitting = protocol;
   fitting.max_driven = protocol.max_driven > 0 ? std::min(protocol.max_driven, num_agents) : num_agents;
   const ScenePlan plan = plan_scene(*map, at_start->scene().agents, fitting, /*density=*/1, config.seed);
-  std::vector<int32_t> tracks, replayed;
+  std::vector<int32_t> driven, replayed;
   for (int32_t track = 0; track < static_cast<int32_t>(plan.roles.size()); ++track) {
     const SceneRole role = plan.roles[static_cast<size_t>(track)];
     if (role == SceneRole::removed) continue;
-    (role == SceneRole::driven ? tracks : replayed).push_back(track);
+    (role == SceneRole::driven ? driven : replayed).push_back(track);
   }
-  if (tracks.empty()) return nullptr;
-  const size_t num_driven = tracks.size(), num_left = static_cast<size_t>(num_agents) - num_driven;
-  if (replayed.size() > num_left) {
-    sort_by_distance(*map, tracks, &replayed);
-    replayed.resize(num_left);
+  if (driven.empty()) return nullptr;
+  if (replayed.size() > max_replayed) {
+    sort_by_distance(*map, driven, &replayed);
+    replayed.resize(max_replayed);
   }
-  tracks.insert(tracks.end(), replayed.begin(), replayed.end());
-  std::vector<uint8_t> is_replayed(tracks.size(), 1);
-  std::fill_n(is_replayed.begin(), num_driven, uint8_t{0});
-  return with_tracks(*map, tracks, is_replayed, num_agents);
+  return with_tracks(*map, driven, replayed, num_agents);
 }
 
 SceneSets::SceneSets(const Config& config, const SimulatorConfig& world, std::vector<WorldSpec> worlds,

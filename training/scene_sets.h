@@ -15,9 +15,10 @@
 namespace pictura {
 
 /// Compiles a scene for worlds of num_agents agents. Roles, starts and goals are those of evaluations
-/// (evaluation/scene_plan.h): the driven tracks come first, then the replayed ones. If there are more tracks than
-/// agents, the replayed ones farthest from driven ones are left out. `config` is that of the worlds. Returns null where
-/// the protocol lets no road user be driven. Throws Error for scenes that cannot be read or simulated.
+/// (evaluation/scene_plan.h), see with_tracks(). More road users than agents follow their records, and more replayed
+/// tracks than config.parked_cars are left out, those farthest from driven ones. `config` is that of the worlds.
+/// Returns null where the protocol lets no road user be driven. Throws Error for scenes that cannot be read or
+/// simulated.
 std::shared_ptr<const CompiledMap> compile_training_scene(const SceneRef& scene, const SceneProtocol& protocol,
                                                           SimulatorConfig config, int num_agents);
 

@@ -23,7 +23,8 @@ SimulatorConfig training_world(const Config& config, Device device) {
   const SceneProtocol protocol = config.simulator.scenes.training_protocol();
   world = protocol_config(protocol, world);
   world.episode_steps = std::min(config.simulator.episode_steps, protocol.steps);
-  world.reset_inactive_fraction = 1;  // of the driven agents
+  world.reset_inactive_fraction = 1;
+  world.parked_cars = config.simulator.scenes.max_replayed;
   return world;
 }
 

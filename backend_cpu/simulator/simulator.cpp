@@ -249,6 +249,10 @@ class SimulatorCpu final : public Simulator {
     };
     const int num_parked = world.num_boxes - world.num_agents;
     for (int car = 0; car < num_parked; ++car) {
+      if (has_replayed_tracks(world.map)) {
+        replay_track(world, car, 0);
+        continue;
+      }
       put_parked_car(world, car, first_try(!world.map.parking_spots.empty(), [&](int i) {
                        const ParkingSpot& spot = parking_spot(world, car, i);
                        const AgentBox box = parked_box(world, car, spot);
@@ -298,6 +302,9 @@ class SimulatorCpu final : public Simulator {
       const auto slot = static_cast<size_t>(world.first_slot + agent);
       results.valid[slot] = is_counted(world, agent, commands[slot]);
       advance(world, agent, commands[slot], steps);
+    }
+    for (int i = 0; has_replayed_tracks(world.map) && i < world.num_boxes - world.num_agents; ++i) {
+      replay_track(world, i, steps);
     }
     sort_into_cells(world, &worlds_.box_cells[index]);
     for (int agent = 0; agent < world.num_agents; ++agent) find_collisions(world, agent);

@@ -48,7 +48,9 @@ struct PhaseArrays {
   uint8_t* driver = nullptr;
   ObservationView observations;
   uint8_t entity_sets = 0;
-  uint8_t has_lives = 0;   // whether some map has roads that end
+  uint8_t has_lives = 0;            // whether some map has roads that end
+  uint8_t has_replayed_tracks = 0;  // whether some map has
+  int32_t parked_per_world = 0;
   uint8_t has_crowds = 0;  // whether some world is a crowd
   // Between phases and steps.
   uint8_t* began = nullptr;          // [num_worlds] an episode began in the last step: the next episode is to be made

@@ -116,12 +116,16 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
   const auto parked_at = [&](int car, int i) {
     return parked_box(world, car, world.map.parking_spots.empty() ? ParkingSpot{} : parking_spot(world, car, i));
   };
-  choose_tries(team, world, scratch, world.num_agents, num_parked, parked_at,
+  const bool replays = has_replayed_tracks(world.map);
+  choose_tries(team, world, scratch, world.num_agents, replays ? 0 : num_parked, parked_at,
                [&](const auto& group, int car, int i, const AgentBox& box) {
                  return !world.map.parking_spots.empty() &&
                         may_park(world.map, box, parking_spot(world, car, i), group);
                });
-  team.for_each(num_parked, [&](int car) { put_parked_car(world, car, scratch.chosen_try[world.num_agents + car]); });
+  team.template for_each_by_groups<kThreadsPerAgent>(num_parked, [&](const auto& group, int car) {
+    if (replays) return replay_track(world, car, 0, group);
+    if (group.rank() == 0) put_parked_car(world, car, scratch.chosen_try[world.num_agents + car]);
+  });
   const auto agent_at = [&](int agent, int i) {
     return has_places(world, agent) ? spawn_box(world, agent, i) : AgentBox{};
   };

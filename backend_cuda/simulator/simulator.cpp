@@ -344,6 +344,8 @@ class SimulatorCuda final : public Simulator {
     arrays.observations = arrays_.observations;
     arrays.entity_sets = config().vector_observations;
     arrays.has_lives = setup_.has_lives();
+    arrays.has_replayed_tracks = setup_.has_replayed_tracks();
+    arrays.parked_per_world = config().parked_cars;
     arrays.has_crowds = has_crowds_;
     arrays.began = scratch_.began.data();
     arrays.prepares = scratch_.prepares.data();

@@ -46,6 +46,21 @@ struct Advance {
   }
 };
 
+/// Phase that moves a replayed track's box: box `index % boxes_per_world` of those of a world that are no agents'.
+struct ReplayTracks {
+  PhaseArrays arrays;
+  template <typename ThreadGroup>
+  PICTURA_HD void operator()(const ThreadGroup& group, int index) const {
+    const int w = index / arrays.parked_per_world, i = index % arrays.parked_per_world;
+    if (arrays.has_rejected_command() || arrays.episode_over[w]) return;
+    const WorldView world = arrays.world(w);
+    if (!has_replayed_tracks(world.map)) return;
+    replay_track(world, i, arrays.episode_step[w] + 1, group);
+    const int box = world.num_agents + i;
+    if (group.rank() == 0) world.cell_centers[box] = center_of(world.boxes[box]);
+  }
+};
+
 /// Phase for collisions, reward and halt of an agent.
 struct ApplyRewardAndHalt {
   PhaseArrays arrays;
@@ -183,6 +198,10 @@ void launch_step(const Launch& launch, const PhaseArrays& arrays, const CommandT
                      launch.fill(arrays.rejected_slot, sizeof(int32_t), kNoSlot & 0xFF);
                      launch.threads(arrays.num_slots, CheckCommands<CommandType>{arrays, commands});
                      launch.template groups<kThreadsPerAgent>(arrays.num_slots, Advance<CommandType>{arrays, commands});
+                     if (arrays.has_replayed_tracks) {
+                       launch.template groups<kThreadsPerAgent>(arrays.num_worlds * arrays.parked_per_world,
+                                                                ReplayTracks{arrays});
+                     }
                      launch_sort_boxes(launch, arrays);
                      launch.template groups<kThreadsPerAgent>(arrays.num_slots, ApplyRewardAndHalt{arrays});
                      launch.template groups<kWarp>(arrays.num_worlds, FinishStep<CommandType>{arrays, commands});

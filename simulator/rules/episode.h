@@ -37,12 +37,12 @@ PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType&
          driver_kind_of(world, agent) == 0;
 }
 
-/// Whether the agent counts as driving in the decision whether an episode ends. Agents that wait to enter count. So do
-/// agents that follow a record, even where the record has no state, unless their map decides which agents follow it:
-/// then only the other agents count.
+/// Whether the agent counts as driving in the decision whether an episode ends. Agents that wait to enter count, and so
+/// do agents that follow a record, even where the record has no state; but where some tracks are replayed, all agents
+/// are there from the start.
 PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
   const auto status = world.agents.status[world.first_slot + agent];
-  if (has_replayed_agents(world.map)) return takes_actions(status) && !is_replayed(world.map, agent);
+  if (has_replayed_tracks(world.map)) return takes_actions(status);
   return takes_actions(status) || status == AgentStatus::waiting ||
          (status == AgentStatus::absent && has_record(world.map));
 }

@@ -31,10 +31,8 @@ PICTURA_HD inline int draw_driver_kind(const OtherShares& shares, uint64_t seed,
   return 0;
 }
 
-/// Kind of an agent that follows its record whatever its command; its driver is kRecordDriver.
-constexpr int kRecordKind = 1 + kNumImpairments + kMaxOtherPolicies, kRecordDriver = 1 + kMaxOtherPolicies;
-
-/// Impairment and driver of a kind. The driver is 0 for the simulator's main policy, and 1 + i for policy i.
+/// Impairment and driver of a result of draw_driver_kind(). The driver is 0 for the simulator's main policy, and 1 + i
+/// for policy i.
 PICTURA_HD constexpr Impairment impairment_of(int other) {
   return other > kNumImpairments ? Impairment::none : static_cast<Impairment>(other);
 }

@@ -153,12 +153,12 @@ struct MapView {
   GridView near_stop_lines;
   Span<const RecordedAgent> recorded_agents;  // in the order of the worlds' agents; empty without a record
   Span<const RecordedState> recorded_states;  // [recorded_agents, recorded_steps]
-  // [recorded_agents] 1: the agent follows its record whatever its command; empty: commands decide.
-  Span<const uint8_t> replayed_agents;
   Span<const SideEdge> side_edges;  // edges of maps with a record, for road_side()
   GridView side_cells;
-  Span<const LightState> recorded_lights;         // [stop_lines, recorded_steps]; if empty, lights follow plans
-  int32_t recorded_steps = 0;                     // from the step at which episodes start
+  Span<const LightState> recorded_lights;  // [stop_lines, recorded_steps]; if empty, lights follow plans
+  int32_t recorded_steps = 0;              // from the step at which episodes start
+  // Above 0: index of the first recorded_agents that are boxes of worlds, but none of their agents.
+  int32_t first_replayed = 0;
   float max_box_radius_m = 0, max_speed_mps = 0;  // maximum half-diagonal of boxes, and maximum speed
   uint8_t is_open = 0;                            // whether roads end, so that agents leave and enter
 };
@@ -166,13 +166,8 @@ struct MapView {
 /// Whether the map comes from a recorded scene, whose road users are all agents of its worlds.
 PICTURA_HD inline bool has_record(const MapView& map) { return !map.recorded_agents.empty(); }
 
-/// Whether the map, rather than commands, decides which agents follow their records.
-PICTURA_HD inline bool has_replayed_agents(const MapView& map) { return !map.replayed_agents.empty(); }
-
-/// Whether an agent follows its record whatever its command.
-PICTURA_HD inline bool is_replayed(const MapView& map, int agent) {
-  return has_replayed_agents(map) && map.replayed_agents[agent] != 0;
-}
+/// Whether some road users of the scene only follow their records: they are boxes like parked cars, not agents.
+PICTURA_HD inline bool has_replayed_tracks(const MapView& map) { return map.first_replayed > 0; }
 
 /// Calls visit(&span) for every array of the view, so that arrays can be copied to another memory.
 template <typename Visit>
@@ -200,7 +195,6 @@ PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
   visit(&view->wall_middles);
   visit(&view->recorded_agents);
   visit(&view->recorded_states);
-  visit(&view->replayed_agents);
   visit(&view->recorded_lights);
   visit(&view->side_edges);
   GridView* const lists[] = {&view->segment_cells,        &view->edge_cells,       &view->wall_cells,

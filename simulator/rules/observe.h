@@ -127,8 +127,10 @@ PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsPresen
 
 /// Speed of a world's box as other agents observe it: 0 for parked cars.
 PICTURA_HD inline float observed_speed_mps(const WorldView& world, int box) {
-  const bool moves = world.options.auxiliary_observations && box < world.num_agents;
-  return moves ? world.agents.speed_mps[world.first_slot + box] : 0.0f;
+  if (!world.options.auxiliary_observations) return 0.0f;
+  if (box < world.num_agents) return world.agents.speed_mps[world.first_slot + box];
+  if (!has_replayed_tracks(world.map)) return 0.0f;
+  return replayed_state(world.map, box - world.num_agents, world.step).speed_mps;
 }
 
 template <typename ThreadGroup = SingleThread>

@@ -32,10 +32,17 @@ PICTURA_HD inline bool walks(const WorldView& world, int agent) {
 }
 
 template <typename ThreadGroup>
+PICTURA_HD LaneFit fit_class(const MapView& map, AgentClass agent_class, Vec2 p, float z_m, float heading_rad,
+                             int32_t current_lane, const ThreadGroup& group) {
+  return agent_class == AgentClass::pedestrian ? fit_walk(map, p, z_m, heading_rad, current_lane, group)
+                                               : fit_lane(map, p, z_m, heading_rad, current_lane, group);
+}
+
+template <typename ThreadGroup>
 PICTURA_HD LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_m, float heading_rad,
                              int32_t current_lane, const ThreadGroup& group) {
-  return walks(world, agent) ? fit_walk(world.map, p, z_m, heading_rad, current_lane, group)
-                             : fit_lane(world.map, p, z_m, heading_rad, current_lane, group);
+  return fit_class(world.map, world.agents.agent_class[world.first_slot + agent], p, z_m, heading_rad, current_lane,
+                   group);
 }
 
 /// Removes the box of an agent that no longer has a body.
@@ -80,6 +87,35 @@ PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const
   agents.events[slot] = kEventNone;
   world.boxes[agent] = box_of(agents, slot);
   world.boxes_before[agent] = goes_on ? before : world.boxes[agent];
+}
+
+/// State of the replayed track of box num_agents + i, `step` steps after its episode's start; absent where the map has
+/// fewer replayed tracks.
+PICTURA_HD inline RecordedState replayed_state(const MapView& map, int i, int step) {
+  const int agent = map.first_replayed + i;
+  return agent < static_cast<int>(map.recorded_agents.size()) ? recorded_state(map, agent, step) : RecordedState{};
+}
+
+/// Places box num_agents + i, of a replayed track, where its record has it `step` steps after the episode's start, or
+/// nowhere. Only the first thread of the group writes.
+template <typename ThreadGroup = SingleThread>
+PICTURA_HD void replay_track(const WorldView& world, int i, int step, const ThreadGroup& group = {}) {
+  const RecordedState at = replayed_state(world.map, i, step);
+  AgentBox box;
+  box.drawn = 0;
+  if (at.is_present) {
+    const RecordedAgent& recorded = world.map.recorded_agents[world.map.first_replayed + i];
+    const auto agent_class = static_cast<AgentClass>(recorded.agent_class);
+    const Vec3 p = at.position_m;
+    const LaneFit fit = fit_class(world.map, agent_class, p.xy(), p.z, at.heading_rad, /*current_lane=*/-1, group);
+    box = box_at(agent_class, {recorded.length_m, recorded.width_m, recorded.height_m}, {p.x, p.y, fit.z_m},
+                 sincos_of(at.heading_rad));
+  }
+  if (group.rank() > 0) return;
+  AgentBox& own = world.boxes[world.num_agents + i];
+  const bool goes_on = step > 0 && own.drawn && box.drawn;
+  world.boxes_before[world.num_agents + i] = goes_on ? own : box;
+  own = box;
 }
 
 /// Starts the agent's episode with its goal, the end of its record, as all of its waypoints; the last waypoint is

@@ -324,10 +324,11 @@ PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const ThreadG
   return fits_map(map, box, group) && (box.agent_class == AgentClass::pedestrian || !straddles_stop_line(map, box));
 }
 
-/// Whether the agent that chose try `i` is part of the episode; -1 means that it found no place. Of recorded agents all
-/// are, except those that follow their records whatever their commands.
+/// Whether the agent that chose try `i` is part of the episode; -1 means that it found no place. Recorded agents are;
+/// where some tracks are replayed, only agents that are present at the start.
 PICTURA_HD inline bool joins_episode(const WorldView& world, int agent, int i) {
-  return i >= 0 || (has_record(world.map) && !is_replayed(world.map, agent));
+  if (has_replayed_tracks(world.map)) return has_body(world.agents.status[world.first_slot + agent]);
+  return i >= 0 || has_record(world.map);
 }
 
 /// Places the agent on its route with a speed along the route, and draws its first goals.

@@ -162,8 +162,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   const int slot = world.first_slot + agent;
   const AgentBox before = world.boxes[agent];
   const bool is_recorded = agents.status[slot] == AgentStatus::recorded;
-  const bool is_to_follow = is_follow_record_command(command) || is_replayed(world.map, agent);
-  if (is_to_follow && may_follow_record(world, agent)) {
+  if (is_follow_record_command(command) && may_follow_record(world, agent)) {
     return follow_record(world, agent, step, group);
   }
   if (!takes_actions(world, agent)) {

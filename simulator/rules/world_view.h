@@ -133,7 +133,6 @@ PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
 
 /// Kind of the agent in this episode, see draw_driver_kind().
 PICTURA_HD inline int driver_kind_of(const WorldView& world, int agent) {
-  if (is_replayed(world.map, agent)) return kRecordKind;
   return draw_driver_kind(world.options.others, world.seed, world.global_world, static_cast<uint32_t>(agent),
                           world.episode);
 }

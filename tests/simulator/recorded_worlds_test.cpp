@@ -99,65 +99,91 @@ TEST(RecordedWorlds, StartAtAChosenStep) {
               HasSubstr("expected a start step in [0, 91), got 91"));
 }
 
-TEST(RecordedWorlds, ReplayedTracksFollowTheRecordWhateverTheirCommands) {
+TEST(RecordedWorlds, ReplayedTracksAreBoxesThatFollowTheRecord) {
   const auto scene = crossing();
   SimulatorConfig config = scene_config(*scene);
   config.reset_inactive_fraction = 1;
   config.leave_at_goal = true;
+  config.parked_cars = static_cast<int>(scene->tracks.size());
   const auto whole = compile_scenario(scene, map_options(config));
-  // Two moving vehicles drive without jerk; the others, among them a pedestrian, are replayed.
-  std::vector<int32_t> tracks;
-  for (int32_t track = 0; track < static_cast<int32_t>(scene->tracks.size()); ++track) {
-    if (is_moving(*scene, track) && scene->valid_of(track)[0] && tracks.size() < 2) tracks.push_back(track);
-  }
-  ASSERT_EQ(tracks.size(), 2u);
+  // Two moving vehicles drive without jerk; the others, among them pedestrians, are replayed.
+  std::vector<int32_t> driven, replayed;
   for (int32_t track = static_cast<int32_t>(scene->tracks.size()); track-- > 0;) {
-    if (track != tracks[0] && track != tracks[1]) tracks.push_back(track);
+    const bool drives = driven.size() < 2 && is_moving(*scene, track) && scene->valid_of(track)[0];
+    (drives ? driven : replayed).push_back(track);
   }
-  std::vector<uint8_t> replayed(tracks.size(), 1);
-  replayed[0] = replayed[1] = 0;
-  const int num_agents = static_cast<int>(tracks.size()) + 3;
-  const auto map = with_tracks(*whole, tracks, replayed, num_agents);
+  ASSERT_EQ(driven.size(), 2u);
+  constexpr int kAgents = 5;
+  const auto map = with_tracks(*whole, driven, replayed, kAgents);
   EXPECT_NE(map->fingerprint, whole->fingerprint);
-  EXPECT_NE(map->fingerprint,
-            with_tracks(*whole, tracks, std::vector<uint8_t>(tracks.size()), num_agents)->fingerprint);
-  const auto simulator = make_simulator("cpu", config, CompiledMaps{map}, {scene_world(*map)});
-  ASSERT_EQ(simulator->num_slots(), num_agents);
-  EXPECT_EQ(simulator->spawn_report().spawned, 2);
-  const std::vector<int32_t> actions(static_cast<size_t>(num_agents), kIdleAction);
+  EXPECT_NE(map->fingerprint, with_tracks(*whole, driven, driven, kAgents)->fingerprint);
+  const auto simulator = make_simulator("cpu", config, CompiledMaps{map}, {{0, kAgents, 0}, {0, 1, 1}});
+  EXPECT_EQ(simulator->spawn_report().spawned, 2 + 1);
+  // The same scene with all tracks as agents that follow the record.
+  const auto as_agents = world_of(scene, 0, {.auxiliary_observations = true});
+  const std::vector<int32_t> actions(kAgents + 1, kIdleAction);
   int32_t step = 0;
   for (; !simulator->episode_over()[0]; ++step) {
     ASSERT_LT(step, config.episode_steps);
-    for (int slot = 0; slot < num_agents; ++slot) {
-      SCOPED_TRACE(::testing::Message() << "slot " << slot << ", step " << step);
-      const auto at = static_cast<size_t>(slot);
-      if (slot < 2) {
-        ASSERT_EQ(simulator->arrays().driver[at], 0);
-        continue;
+    for (int slot = 2; slot < kAgents; ++slot) ASSERT_EQ(status_of(*simulator, slot), AgentStatus::absent);
+    for (const int first : {kAgents, kAgents + config.parked_cars + 1}) {  // of either world's other boxes
+      for (int i = 0; i < config.parked_cars; ++i) {
+        SCOPED_TRACE(::testing::Message() << "box " << first + i << ", step " << step);
+        const AgentBox& box = simulator->scene().agents[static_cast<size_t>(first + i)];
+        const bool is_track = i < static_cast<int>(replayed.size());
+        const AgentBox expected = is_track ? as_agents->scene().agents[static_cast<size_t>(replayed[i])] : AgentBox{};
+        ASSERT_EQ(box.drawn, is_track && expected.drawn);
+        if (!box.drawn) continue;
+        ASSERT_EQ(box.agent_class, expected.agent_class);
+        ASSERT_EQ(box.length_m, expected.length_m);
+        ASSERT_EQ(box.center_m.x, expected.center_m.x);
+        ASSERT_EQ(box.center_m.y, expected.center_m.y);
+        ASSERT_NEAR(box.center_m.z, expected.center_m.z, 0.1f);
+        ASSERT_EQ(box.cos_heading, expected.cos_heading);
       }
-      ASSERT_EQ(simulator->arrays().driver[at], kRecordDriver);
-      const bool is_present = at < tracks.size() && scene->valid_of(tracks[at])[static_cast<size_t>(step)] != 0;
-      ASSERT_EQ(status_of(*simulator, slot), is_present ? AgentStatus::recorded : AgentStatus::absent);
-      if (!is_present) continue;
-      const TrackState& state = scene->states_of(tracks[at])[static_cast<size_t>(step)];
-      ASSERT_LT(length((simulator->scene().agents[at].center_m - state.position_m).xy()), 1e-3f);
     }
-    const StepResult result = simulator->step(Array(actions));
-    for (int slot = 2; slot < num_agents; ++slot) {
-      ASSERT_EQ(result.valid[static_cast<size_t>(slot)], 0);
-      ASSERT_EQ(result.truncated[static_cast<size_t>(slot)] + result.terminated[static_cast<size_t>(slot)], 0);
-    }
+    simulator->step(Array(actions));
+    as_agents->step(recorded(*as_agents));
   }
   EXPECT_GT(simulator->totals().agent_steps, 0);
-  EXPECT_LE(simulator->totals().agent_steps, 2 * step);
   // The episode ended because no driven agent drives any more, or at its full length.
   const bool any_drives =
       status_of(*simulator, 0) == AgentStatus::active || status_of(*simulator, 1) == AgentStatus::active;
   EXPECT_EQ(any_drives, step == config.episode_steps);
-  const auto refusal = [&](int agents) {
+  const auto refusal = [&](const std::vector<int32_t>& tracks, int agents) {
     return test::message_of<UsageError>([&] { with_tracks(*whole, tracks, replayed, agents); });
   };
-  EXPECT_THAT(refusal(4), HasSubstr("expected at most 4 tracks"));
+  EXPECT_THAT(refusal(driven, 1), HasSubstr("expected 1 to 1 driven tracks, got 2"));
+  EXPECT_THAT(refusal({}, 1), HasSubstr("got 0"));
+  EXPECT_THAT(
+      test::message_of<UsageError>([&] { make_simulator("cpu", config, CompiledMaps{map}, {{0, kAgents + 1, 0}}); }),
+      HasSubstr("expected at most 5 agents"));
+}
+
+TEST(RecordedWorlds, ReplayedTracksAreObservedAndHitLikeAgents) {
+  const auto scene = crossing(kNobodyInTheWay);
+  SimulatorConfig config = scene_config(*scene);
+  config.parked_cars = 8;
+  const auto whole = compile_scenario(scene, map_options(config));
+  std::vector<int32_t> others;
+  for (int32_t track = 1; track < static_cast<int32_t>(scene->tracks.size()); ++track) others.push_back(track);
+  const auto map = with_tracks(*whole, std::vector<int32_t>{0}, others, 1);
+  config.parked_cars = static_cast<int>(others.size());
+  const auto simulator = make_simulator("cpu", config, CompiledMaps{map}, {{0, 1, 0}});
+  config.parked_cars = 0;
+  const auto as_agents = make_simulator("cpu", config, CompiledMaps{whole}, {scene_world(*whole)});
+  for (int step = 0; step < 40; ++step) {
+    const Span<const float> partners = simulator->observations().partners,
+                            expected = as_agents->observations().partners.subspan(0, partners.size());
+    for (size_t i = 0; i < partners.size(); ++i) ASSERT_NEAR(partners[i], expected[i], 1e-3f) << "step " << step;
+    ASSERT_TRUE(std::any_of(partners.begin(), partners.end(), [](float value) { return value != 0; }));
+    const std::vector<int32_t> own{kIdleAction};
+    simulator->step(Array(own));
+    std::vector<Command> commands = recorded(*as_agents);
+    commands[0] = {};
+    as_agents->step(commands);
+    ASSERT_EQ(simulator->state().events[0], as_agents->state().events[0]) << "step " << step;
+  }
 }
 
 std::unique_ptr<Simulator> lit_world_of(const std::shared_ptr<const Scenario>& scene, int32_t start_step = 0) {

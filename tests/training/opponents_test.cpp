@@ -70,7 +70,7 @@ TEST_F(OpponentsTest, DriveAsTheyWereTrainedAndTheLearnerTheRest) {
   for (int step = 0; step < 5; ++step) {
     const SimulatorArrays& input = simulator->arrays();
     const Span<const Command> commands = opponents.commands(input, own_actions, executor.get());
-    const at::Tensor own = own_slots(input);
+    const at::Tensor own = opponents.own_slots(input);
     std::vector<std::vector<Command>> expected(2, std::vector<Command>(own_actions.size()));
     for (size_t i = 0; i < 2; ++i) controllers[i]->act(input, {}, expected[i]);
     for (int slot = 0; slot < num_slots; ++slot) {

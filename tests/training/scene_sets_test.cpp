@@ -69,7 +69,8 @@ TEST_F(SceneSetsTest, RolesStartsAndGoalsAreThoseOfEvaluations) {
   write(1, {.num_vehicles = 14});
   for (const char* name : {"gpudrive", "womd", "waymax"}) {
     SCOPED_TRACE(name);
-    const Config config = this->config({fmt::format("simulator.scenes.protocol={}", name)});
+    const Config config =
+        this->config({fmt::format("simulator.scenes.protocol={}", name), "simulator.scenes.max_replayed=3"});
     const SceneProtocol protocol = scene_protocol(name);
     const SimulatorConfig world = training_world(config, {});
     EXPECT_EQ(world.after_infraction, protocol.after_infraction);
@@ -82,16 +83,17 @@ TEST_F(SceneSetsTest, RolesStartsAndGoalsAreThoseOfEvaluations) {
     const auto whole =
         compile_scenario(protocol_scene(load_scenario(folder_.path()), protocol),
                          {.walls = false, .observed_span_m = protocol.observed_span_m}, protocol.start_step);
-    const auto evaluated = make_simulator("cpu", world, CompiledMaps{whole}, {scene_world(*whole)});
+    SimulatorConfig without_cars = world;
+    without_cars.parked_cars = 0;
+    const auto evaluated = make_simulator("cpu", without_cars, CompiledMaps{whole}, {scene_world(*whole)});
     const ScenePlan plan = plan_scene(*whole, evaluated->scene().agents, protocol, 1, 1);
-    const auto training = make_simulator("cpu", world, CompiledMaps{map}, {scene_world(*map)});
+    const auto training = make_simulator("cpu", world, CompiledMaps{map}, {{0, kAgents, 0}});
     ASSERT_EQ(training->num_slots(), kAgents);
     int slot = 0;
     for (size_t track = 0; track < plan.roles.size(); ++track) {
       if (plan.roles[track] != SceneRole::driven) continue;
       const AgentStateView a = training->state(), b = evaluated->state();
       const auto other = static_cast<int>(track);
-      EXPECT_EQ(map->rules.record.replayed[static_cast<size_t>(slot)], 0);
       for (const auto& [own, its] : {std::pair{a.x_m, b.x_m},
                                      {a.y_m, b.y_m},
                                      {a.z_m, b.z_m},
@@ -105,19 +107,22 @@ TEST_F(SceneSetsTest, RolesStartsAndGoalsAreThoseOfEvaluations) {
       ++slot;
     }
     EXPECT_GT(slot, 0);
-    // The nearest replayed tracks fill the world; no track takes part twice.
-    EXPECT_EQ(std::count(map->rules.record.replayed.begin(), map->rules.record.replayed.end(), 1), kAgents - slot);
-    for (int i = slot; i < kAgents; ++i) EXPECT_GT(training->state().length_m[i], 0);
+    for (int i = slot; i < kAgents; ++i) EXPECT_EQ(training->state().status[i], AgentStatus::absent);
+    const auto num_replayed =
+        static_cast<size_t>(std::count(plan.roles.begin(), plan.roles.end(), SceneRole::replayed));
+    EXPECT_EQ(map->rules.record.agents.size(), kAgents + std::min<size_t>(num_replayed, 3));
   }
 }
 
 TEST_F(SceneSetsTest, ChosenRoadUsersDriveAndTheOthersAreReplayed) {
   write(1);
-  const auto driven = [&](const std::vector<std::string>& more) {
+  const auto driven = [&](const std::vector<std::string>& more) -> int {
     const Config config = this->config(more);
     const auto map = compile_training_scene(find_scene(folder_.path()), config.simulator.scenes.training_protocol(),
                                             training_world(config, {}), 12);
-    return map ? std::count(map->rules.record.replayed.begin(), map->rules.record.replayed.end(), 0) : 0;
+    if (!map) return 0;
+    const auto training = make_simulator("cpu", training_world(config, {}), CompiledMaps{map}, {{0, 12, 0}});
+    return static_cast<int>(training->spawn_report().spawned);
   };
   const auto all = driven({});
   EXPECT_GT(all, 2);

@@ -332,15 +332,15 @@ TEST_F(CudaSimulatorTest, ReplaysTracksThatTheMapChooses) {
   config.reset_inactive_fraction = 1;
   config.leave_at_goal = true;
   const auto whole = compile_scenario(scene, map_options(config));
-  std::vector<int32_t> tracks(scene->tracks.size());
-  std::vector<uint8_t> replayed(tracks.size());
-  for (size_t i = 0; i < tracks.size(); ++i) {
-    tracks[i] = static_cast<int32_t>(tracks.size() - 1 - i);
-    replayed[i] = i % 3 != 0;
+  std::vector<int32_t> driven, replayed;
+  for (int32_t track = 0; track < static_cast<int32_t>(scene->tracks.size()); ++track) {
+    (track % 3 == 0 ? driven : replayed).push_back(track);
   }
-  const auto num_agents = static_cast<int>(tracks.size()) + 5;
-  const CompiledMaps maps{with_tracks(*whole, tracks, replayed, num_agents), whole};
-  const std::vector<WorldSpec> worlds{{0, num_agents, 0}, {0, 20, 1}, scene_world(*whole, 1, 2)};
+  config.parked_cars = static_cast<int>(replayed.size()) + 2;
+  const auto num_agents = static_cast<int>(driven.size()) + 5;
+  const CompiledMaps maps{with_tracks(*whole, driven, replayed, num_agents),
+                          compile_map(testing::stadium(200, 2), map_options(config))};
+  const std::vector<WorldSpec> worlds{{0, num_agents, 0}, {0, 7, 1}, {1, 20, 2}};
   const auto cpu = make_simulator("cpu", config, maps, worlds), cuda = make_simulator("cuda", config, maps, worlds);
   run_same(cpu.get(), cuda.get(), 250, 25);
 }

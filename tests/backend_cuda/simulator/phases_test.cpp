@@ -197,10 +197,11 @@ TEST(Phases, FollowRecordsOfReplayedTracks) {
   config.leave_at_goal = true;
   config.others.blind = 0.3f;
   const auto whole = compile_scenario(scene, map_options(config));
-  const std::vector<int32_t> tracks{2, 5, 0, 9, 7, 1, 3};
-  const std::vector<uint8_t> replayed{0, 0, 0, 1, 1, 1, 0};
-  const CompiledMaps maps{with_tracks(*whole, tracks, replayed, 10), whole};
-  const std::vector<WorldSpec> worlds{{0, 10, 0}, scene_world(*whole, 1, 1), {0, 6, 2}};
+  config.parked_cars = 6;
+  const CompiledMaps maps{with_tracks(*whole, std::vector<int32_t>{2, 5, 0}, std::vector<int32_t>{9, 7, 1, 3}, 10),
+                          with_tracks(*whole, std::vector<int32_t>{1}, std::vector<int32_t>{0, 2, 3, 4, 5, 6, 7}, 4),
+                          compile_map(testing::stadium(200, 2), map_options(config))};
+  const std::vector<WorldSpec> worlds{{0, 10, 0}, {1, 4, 1}, {0, 2, 2}, {2, 9, 3}};
   expect_same(config, maps, worlds, 130, 12);
   expect_same(config, maps, worlds, 60, 13, /*by_commands=*/true);
 }

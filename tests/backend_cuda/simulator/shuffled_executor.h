@@ -205,6 +205,8 @@ class ShuffledExecutor {
     arrays.observations = results.observation_view();
     arrays.entity_sets = host.setup.config.vector_observations;
     arrays.has_lives = host.setup.has_lives();
+    arrays.has_replayed_tracks = host.setup.has_replayed_tracks();
+    arrays.parked_per_world = host.setup.config.parked_cars;
     arrays.has_crowds = has_crowds_;
     arrays.began = began_.data();
     arrays.prepares = prepares_.data();
