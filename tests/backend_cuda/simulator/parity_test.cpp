@@ -339,7 +339,7 @@ TEST_F(CudaSimulatorTest, ReplaysTracksThatTheMapChooses) {
   config.parked_cars = static_cast<int>(replayed.size()) + 2;
   const auto num_agents = static_cast<int>(driven.size()) + 5;
   const CompiledMaps maps{with_tracks(*whole, driven, replayed, num_agents),
-                          compile_map(testing::stadium(200, 2), map_options(config))};
+                          compile_map(load_map("procedural:1"), map_options(config))};
   const std::vector<WorldSpec> worlds{{0, num_agents, 0}, {0, 7, 1}, {1, 20, 2}};
   const auto cpu = make_simulator("cpu", config, maps, worlds), cuda = make_simulator("cuda", config, maps, worlds);
   run_same(cpu.get(), cuda.get(), 250, 25);
