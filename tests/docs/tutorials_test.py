@@ -17,7 +17,7 @@ from documents_test import command_lines
 from pages import ROOT
 
 PICTURA = ""
-PAGES = [ROOT / "README.md"] + [ROOT / f"docs/tutorials/{name}.md" for name in ("first_run", "gpu", "reward", "rig", "map", "look", "probe")]
+PAGES = [ROOT / "README.md"] + [ROOT / f"docs/tutorials/{name}.md" for name in ("first_run", "gpu", "reward", "rig", "map", "look", "probe", "scenes")]
 PAGES += [ROOT / f"docs/how-to/{name}.md" for name in ("train", "evaluate", "probe", "own_map", "own_reward", "own_rig", "record_and_replay")]
 # Maximum values of options that take long.
 AT_MOST = {"--steps": 20, "--agents": 8, "--scenarios": 2, "--episodes": 1, "--follow": 3, "--egos": 8, "--slots": 32, "--removals": 20, "--paths": 1}
