@@ -94,11 +94,13 @@ void check(const SimulatorConfig& config, const CompiledMaps& maps, const std::v
     const CompiledMap& map = *maps[world.map];
     if (!map.scenario) continue;
     const MapRecord& record = map.rules.record;
-    const auto num_tracks = static_cast<int>(record.agents.size());
-    if (record.first_replayed > 0 ? world.num_agents > record.first_replayed : world.num_agents != num_tracks) {
-      fail_usage("simulator: world {}: expected {} {} agents, as scene {} has tracks, got {}", world.global_world,
-                 record.first_replayed > 0 ? "at most" : "exactly",
-                 record.first_replayed > 0 ? record.first_replayed : num_tracks, map.scenario->id, world.num_agents);
+    if (record.first_replayed > 0 && world.num_agents > record.first_replayed) {
+      fail_usage("simulator: world {}: expected at most {} agents, as scene {} was compiled for, got {}",
+                 world.global_world, record.first_replayed, map.scenario->id, world.num_agents);
+    }
+    if (record.first_replayed == 0 && static_cast<size_t>(world.num_agents) != map.scenario->tracks.size()) {
+      fail_usage("simulator: world {}: expected as many agents as scene {} has tracks, {}, got {}", world.global_world,
+                 map.scenario->id, map.scenario->tracks.size(), world.num_agents);
     }
     constexpr float kSameStep = 0.01f;  // relative to the recording's step: WOMD's steps are about 0.10002 s
     if (std::abs(config.dt_s - map.scenario->dt_s) > kSameStep * map.scenario->dt_s) {
