@@ -153,7 +153,7 @@ struct MapView {
   GridView near_stop_lines;
   Span<const RecordedAgent> recorded_agents;  // in the order of the worlds' agents; empty without a record
   Span<const RecordedState> recorded_states;  // [recorded_agents, recorded_steps]
-  Span<const SideEdge> side_edges;  // edges of maps with a record, for road_side()
+  Span<const SideEdge> side_edges;            // edges of maps with a record, for road_side()
   GridView side_cells;
   Span<const LightState> recorded_lights;  // [stop_lines, recorded_steps]; if empty, lights follow plans
   int32_t recorded_steps = 0;              // from the step at which episodes start
