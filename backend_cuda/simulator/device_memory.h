@@ -101,8 +101,8 @@ struct DeviceState {
     agents.get_to(&host_out->agents, stream);
     SimulatorState::visit_arrays(*this, *host_out, [stream](const auto& from, auto& to) { get(from, &to, stream); });
   }
-  /// Copies as many elements as both hold: a snapshot has the size of its worlds, the simulator's own state that of its
-  /// capacity.
+  /// Copies as many elements as both hold: a snapshot has the size of its worlds, the simulator's own state the size of
+  /// its capacity.
   void copy_to(const DeviceState& other, cudaStream_t stream) const {
     agents.copy_to(other.agents, stream);
     SimulatorState::visit_arrays(*this, other, [stream](const auto& from, const auto& to) { copy(from, to, stream); });

@@ -11,8 +11,8 @@ namespace pictura {
 class PixelAccumulator {
  public:
   /// kWhole: entirely visible, weighted by its exact area. kPartial: partly occluded, weighted by its area times the
-  /// visible fraction of its samples. kRemainder: covers the whole pixel, weighted in proportion to its visible samples
-  /// by its share of the area that other fragments leave.
+  /// visible fraction of its samples. kRemainder: covers the whole pixel. Such fragments share the area that other
+  /// fragments leave, in proportion to their visible samples.
   enum Kind : uint8_t { kWhole, kPartial, kRemainder, kNumKinds };
   struct Weight {
     float area = 0;

@@ -68,8 +68,8 @@ PICTURA_HD inline SampleRange whole_range() {
 
 /// Offset that moves a height, as a fraction of kLines_rows, to the lowest bits of a float's mantissa.
 constexpr float kToLowestBits = 1 << 8;  // the sum's lowest mantissa bit is 1 / (kLines_rows * kRowUnits)
-/// Changes of an edge's height from the first column right of the pixel's centre to each column. In the lowest bits,
-/// the pixel's centre has height 2^14; the base of the sequence moves it to 0.
+/// Numbers that, added to an edge's height in the first column right of the pixel's centre, give its height in each
+/// column. They also subtract 2^14, the height of the pixel's centre in the lowest bits, so that the centre is at 0.
 PICTURA_HD inline Int16x8 column_heights(const PolygonEdge& edge) {
   return arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
 }
@@ -116,7 +116,7 @@ PICTURA_HD inline float area_of(const PolygonEdge& edge, const EdgeCrossing& cro
   // left of the edge.
   const float left = max_no_nan(min_no_nan(crossing.left, to), from);
   const float right = max_no_nan(min_no_nan(crossing.right, to), from);
-  // Mean width: half of the pixel where the line has crossed half of it.
+  // Mean width of the part to the left of the edge, as a share of the pixel: the line's x midway between both heights.
   const float width = saturate(((left + right) - (crossing.left + crossing.right)) * edge.half_dx_dy + 0.5f);
   const float area = (right - left) * width + ((edge.dy_dx > 0.0f ? to : from) - right);
   return edge.rows_scale > 0.0f ? area : -area;

@@ -27,8 +27,8 @@ PICTURA_HD inline bool may_occlude(const WallFace& wall, const PinholeCamera& ca
 constexpr float kMinOccluder_px2 = 1.0f, kMinSide_px = 1e-3f;
 /// Maximum distance of an occluder's corners from the image; beyond, precision is too low.
 constexpr float kMaxOccluder_px = 4096.0f;
-/// Margins of occlusion tests, conservative under rounding: an occluded face is inside the occluder by the first, and
-/// its depth is larger by the second.
+/// Margins of occlusion tests, conservative under rounding: an occluded face is inside the sides of the occluder by at
+/// least the first, and its depth is at least the second times the depth of the occluder's plane.
 constexpr float kOccluderMargin_px = 0.05f, kOccluderDepthFactor = 1.002f;
 
 /// Area in the image of the bounding box of a solid's face, by which occluders are chosen. Returns 0 if the face cannot

@@ -286,10 +286,10 @@ PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Ve
   return samples_inside(edge, -edge.x0, -edge.y0);
 }
 
-/// Returns the shared samples of faces a and b, of two primitives, at which a is in front. The decision is made at the
-/// centroid for all shared samples together. Only where two solids change places within a pixel of the centroid, and
-/// all_or_none is false, is it made per sample, by the rule of is_in_front(): the lower object id is in front unless
-/// the other face is nearer by more than kEqualDepth. At all other samples, b is in front.
+/// Returns the shared samples of faces a and b, of two primitives, at which a is in front. One decision, made at the
+/// centroid, holds for all shared samples, unless two solids change places within a pixel of the centroid and
+/// all_or_none is false. Then each sample is decided separately, by the rule of is_in_front(): the lower object id is
+/// in front unless the other face is nearer by more than kEqualDepth. At all other samples, b is in front.
 template <typename Stands>
 PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
                                             bool all_or_none, Stands&& stands) {
