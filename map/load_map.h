@@ -19,12 +19,11 @@ struct LoadReport {
   std::string source;           // the file or the procedural town's name, for messages
 };
 
-/// Loads `name`: an OpenDRIVE file (.xodr), a Lanelet2 file (.osm, with @LATITUDE,LONGITUDE behind it in coordinates
-/// about that place), a town's name looked up as NAME.xodr in the map folder, `procedural[:SEED[:NAME=VALUE,...]]`,
-/// `city[...]` likewise, or one of these with #COPY behind it, its affine copy of that number (map_copy.h), which
-/// replaces options.plan. Files and their copies are imported once and stored in the
-/// cache (map_cache.h); a cache that cannot be read or written only costs time. Throws Error naming the file and the
-/// line or element; UsageError when there is no such map.
+/// Loads `name`: an OpenDRIVE file (.xodr), a Lanelet2 file (.osm), a town (NAME.xodr in the map folder),
+/// `procedural[:SEED[:NAME=VALUE,...]]`, or `city[...]` likewise. FILE.osm@LATITUDE,LONGITUDE has coordinates about
+/// that place. MAP#N is the N-th affine copy of MAP (map_copy.h), whose plan replaces options.plan. Files and their
+/// copies are imported once and stored in the cache (map_cache.h); a cache that cannot be read or written only costs
+/// time. Throws Error naming the file and the line or element; UsageError when there is no such map.
 std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDriveOptions& options = {},
                                         LoadReport* report_out = nullptr, const ImportProgress& progress = {});
 

@@ -11,9 +11,9 @@
 namespace pictura {
 
 /// Placement of light heads. `as_mapped`: at the map's positions. `visible`: heads less than kVisibleHeadAhead_m beyond
-/// the middle of their stop line, or before it, are moved along the line's traffic to that distance. There they stand
-/// kVisibleHeadHeight_m above the road of their lanes, with the same lateral side and facing. So the cameras of a
-/// vehicle that waits at the line see the head.
+/// the middle of their stop line, or before it, are moved in the direction of the line's traffic to that distance.
+/// There they stand kVisibleHeadHeight_m above the road of their lanes, with the same lateral side and facing. So the
+/// cameras of a vehicle that waits at the line see the head.
 enum class LightHeads : uint8_t { as_mapped, visible };
 constexpr std::array<const char*, 2> kLightHeadsNames{"as_mapped", "visible"};
 constexpr float kVisibleHeadAhead_m = 10.0f, kVisibleHeadHeight_m = 3.5f;

@@ -24,7 +24,7 @@ struct PaintedLine {
 /// dashes do not move.
 std::vector<PaintedLine> painted_lines(const RoadMap& map);
 
-/// Maximum width of a road edge outside the painted lines over it for which the edge is not drawn. Maps paint a line
+/// Maximum width by which a road edge that is not drawn extends beyond the painted lines over it. Maps paint a line
 /// along the border of a road, and the chords of both may deviate from the border.
 constexpr float kCoveredEdgeTolerance_m = 2 * kPaintTolerance_m;
 

@@ -49,10 +49,10 @@ LanePieces segments_of(const RoadMap& map, LanePredicate is_wanted);
 std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
 
 /// Marks the wanted lanes of different roads that cross each other elsewhere than at their ends as lanes of junctions,
-/// adds the junctions of these and of the lanes already marked, and assigns them. Lanes that cross, fork or merge are
-/// of one junction, which has the name of the first lane's road. With a bridged length, which is for roads that are cut
-/// into many lanes, junction lanes that follow each other are of one junction too, and so are wanted lanes of at most
-/// this length between two of them. `count_work` receives the work of loops whose length a file determines.
+/// adds the junctions of these and of the lanes already marked, and assigns them. Lanes that cross, fork or merge
+/// belong to one junction, which has the name of the first lane's road. A bridged length is for roads that are cut into
+/// many lanes: then junction lanes that follow each other belong to one junction too, as do wanted lanes of at most
+/// this length between two junction lanes. `count_work` receives the work of loops whose length a file determines.
 void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
                              const std::function<void(std::size_t)>& count_work, RoadMap* map);
 

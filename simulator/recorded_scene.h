@@ -31,8 +31,8 @@ std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenar
 std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<const int32_t> driven,
                                                Span<const int32_t> replayed, int num_agents);
 
-/// Adapts a configuration to a scene: the recording's time step, its length from start_step on as the episode's, no
-/// walls, no parked cars besides its tracks, no early end, and dynamics multipliers of 1.
+/// Adapts a configuration to a scene: the recording's time step, episodes as long as the recording from start_step on,
+/// no walls, no parked cars besides the scene's tracks, no early end, and dynamics multipliers of 1.
 SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step = 0, SimulatorConfig config = {});
 
 /// Returns the world of a scene's map, with all of its tracks.

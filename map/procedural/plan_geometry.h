@@ -89,7 +89,7 @@ inline Curve biarc(const Pose& from, const Pose& to) {
   return {first, second};
 }
 
-inline constexpr double kNoRadiusLimit_m = 1e9;  // maximum radius of a fillet without limit
+inline constexpr double kNoRadiusLimit_m = 1e9;  // max_radius_m of a fillet without a limit
 
 /// Fillet: line, arc and line, tangent to each other, with the largest radius that fits but at most `max_radius_m`. A
 /// biarc if the tangents do not intersect between the poses.

@@ -42,7 +42,7 @@ class DrivableArea {
 
 /// Agreement of logged traffic with the map's edges, over the steps of moving vehicles.
 struct LoggedDriving {
-  int64_t vehicle_steps = 0;  // valid steps at 0.5 m/s or more of vehicles with moving tracks (is_moving())
+  int64_t vehicle_steps = 0;  // valid steps, at 0.5 m/s or more, of vehicles with moving tracks (is_moving())
   int64_t touching = 0;       // vehicle steps in which the box touches an edge
   int64_t off_road = 0;       // vehicle steps in which the box's centre is not on the road
 };

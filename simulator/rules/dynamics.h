@@ -62,8 +62,8 @@ PICTURA_HD inline LongitudinalMotion move_along(LongitudinalMotion from, float j
   return to;
 }
 
-/// Maximum steering angle. Vehicles longer than their class, which occur only in recordings, have the minimum turning
-/// radius of its longest vehicle.
+/// Maximum steering angle. Vehicles that are longer than their class allows, which occur only in recordings, have the
+/// minimum turning radius of the longest allowed vehicle.
 PICTURA_HD inline float max_steer_rad(float wheelbase_m, const ClassLimits& limits) {
   const float longest_m = kWheelbasePerLength * limits.max_length_m;
   if (wheelbase_m <= longest_m) return limits.max_steer_rad;

@@ -20,7 +20,7 @@ PICTURA_HD inline const Entry& drawn_entry(const WorldView& world, int agent, in
   return world.map.entries[random.below(static_cast<int>(world.map.entries.size()))];
 }
 
-/// Returns the point at a distance ahead along first successors, or the end of the way.
+/// Returns the point at a distance ahead along each lane's first successor, or the end of the last lane.
 PICTURA_HD inline RoutePoint point_ahead(const MapView& map, RoutePoint at, float distance_m) {
   constexpr int kMaxLanesAhead = 64;  // a safety bound
   at.s_m += distance_m;

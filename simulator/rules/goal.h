@@ -37,8 +37,8 @@ PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
   return goes_on(left) ? left : right;
 }
 
-/// Advances distance_m along lanes, choosing among successors with equal probability. From a lane without a successor
-/// from which the route continues, it changes to the nearest lane with one. Stops where routes end.
+/// Advances distance_m along lanes, choosing among successors with equal probability. If a lane has no successor but
+/// the route continues, first changes to the nearest lane that has a successor. Stops where routes end.
 PICTURA_HD inline RoutePoint advance_along_lanes(const MapView& map, RoutePoint at, float distance_m,
                                                  RandomStream* random_inout) {
   constexpr int kMaxLanesWalked = 64;  // a safety bound, for many lanes shorter than a metre

@@ -41,7 +41,7 @@ struct MapLane {
   // Range of MapView::successors. The first num_successors are the lanes on which endless routes start, or on open maps
   // the driving and ramp lanes; the other successors follow.
   int32_t first_successor = 0, num_successors = 0, num_all_successors = 0;
-  int32_t left = -1, right = -1;  // neighbours from which routes continue in that sense
+  int32_t left = -1, right = -1;  // neighbours of the same kind as the first successors
   float length_m = 0;
   float speed_limit_mps = 0;
   int32_t light = -1;                  // the stop line that controls the lane
