@@ -14,8 +14,8 @@ CLI::Validator file_ending(const std::string& ending, const std::string& other =
 /// Adds MAP, which may be a recorded scene; `more` names further kinds.
 void add_map_or_scene(CLI::App* command, std::string* map_out, const std::string& more = "");
 
-/// Rejects a command two of whose options write the same file, or one of which writes the policy or the rig that
-/// another reads. Devices may be shared; maps and scenes may be replaced.
+/// Rejects a command if two of its options write the same file, or one option writes the policy or the rig that another
+/// option reads. Devices may be shared; maps and scenes may be replaced.
 void reject_shared_files(const CLI::App& app);
 
 /// Rejects empty texts for all options of a command and its subcommands, since an empty text would count as not given.

@@ -31,8 +31,8 @@ void reject_scene_options(const CLI::App& command, const std::string& map, std::
 /// Throws UsageError if one of these options was given; `why` explains why it would have no effect.
 void reject_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
 
-/// Adds MAP, which may be a recorded scene, the options above, --light-cycles, --light-heads, --control, --start,
-/// --steps, --policy and the policy's device options.
+/// Adds MAP (a map or a recorded scene), the options above, --light-cycles, --light-heads, --control, --start, --steps,
+/// --policy and the policy's device options.
 void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out);
 
 /// Adapts these options to a recorded scene, if MAP is one: all road users follow the recording unless a policy was

@@ -69,9 +69,9 @@ class RealismRoad {
   /// Returns the maximum of this distance over the four lower corners of a box.
   double edge_distance_m(const RealismObject& object, const RealismPose& pose) const;
   /// Whether the middle of a box's front crosses a stop line between two poses, in the line's direction of travel,
-  /// while its light is red at that step of the recording. If it crosses several lines at once, the lights of all must
-  /// be red. A line is ignored if the box is over 2 m above or below it, or heads over 45 degrees away from its
-  /// direction.
+  /// while the line's light is red at that step of the recording. If the box crosses several lines at once, the lights
+  /// of all must be red. A line is ignored if the box is over 2 m above or below it, or heads over 45 degrees away from
+  /// the line's direction.
   bool runs_red_light(const RealismObject& object, const RealismPose& from, const RealismPose& to, int32_t step) const;
 
  private:

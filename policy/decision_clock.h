@@ -9,7 +9,7 @@ namespace pictura {
 
 /// Decision clock of one simulator. All agents decide at steps divisible by policy.decision_steps. An agent that has
 /// just begun (its world was reset, its life began, or the agent was inactive at the previous step) decides at once,
-/// and holds that action until the next of these steps.
+/// and holds that action until the next step divisible by policy.decision_steps.
 class DecisionClock {
  public:
   explicit DecisionClock(int64_t decision_steps) : decision_steps_(decision_steps) {}

@@ -59,7 +59,8 @@ class HttpServer {
   /// Answers num_threads requests at a time by calls of `handler`, which may throw HttpError; `fields`, header lines,
   /// are part of every answer. Throws std::system_error if it cannot listen.
   HttpServer(bool everywhere, int port, int num_threads, std::string fields, Handler handler);
-  /// Closes all connections. Before, handlers that wait for anything except their connection must be made to return.
+  /// Closes all connections. Handlers that wait for anything except their connection must be made to return before this
+  /// call.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;

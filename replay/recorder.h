@@ -24,7 +24,8 @@ struct RecorderOptions {
 /// Draws one agent's images with the CPU renderer.
 class AgentCameras {
  public:
-  /// Creates a renderer for `config`, a policy's, ignoring its device and samples. The simulator must outlive it.
+  /// Creates a renderer for the configuration of a policy, whose device and samples are ignored. The simulator must
+  /// outlive it.
   AgentCameras(Simulator& simulator, RendererConfig config);
   ~AgentCameras();
 
@@ -45,7 +46,7 @@ struct ReplayDecision {
   std::array<float, kNumActions> probabilities{};
   float value = 0;
 };
-/// Returns the response of a policy's logits [kNumActions].
+/// Returns the response of a policy with these logits [kNumActions] and this value.
 ReplayDecision decision_of(Span<const float> logits, float value);
 
 /// Returns a box in a replay's units.

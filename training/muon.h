@@ -45,7 +45,8 @@ class Muon {
   at::Tensor momentum(size_t i) const { return parts_of(momentum_)[i]; }
 
  private:
-  // Matrices that are multiplied together: padded with zeros to one size, and transposed if they are taller than wide.
+  // Matrices that are multiplied in one batch: padded with zeros to one size, and transposed if they are taller than
+  // wide.
   struct Batch {
     int64_t rows = 0, columns = 0;
     std::vector<size_t> weights;
@@ -62,7 +63,7 @@ class Muon {
   const double weight_decay_;
   at::Tensor momentum_;  // [elements of all weights]
   std::vector<Batch> batches_;
-  // Index of each batch element in such a vector, whose size denotes padding; and the inverse.
+  // Index of each batch element in such a vector (for padding, the vector's size), and the inverse mapping.
   at::Tensor element_of_place_, place_of_element_;
   std::vector<at::Tensor> scales_;  // factor of the step by weight, [weights, 1, 1] of each batch
   at::Tensor rate_, failed_;        // f32 scalars of this step

@@ -69,8 +69,8 @@ Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Mi
 
 /// Improves the policy on a rollout, whose advantages it computes. Each rank has consecutive slots of one rollout, with
 /// equally many steps. All ranks improve one policy on the whole rollout, and get the same parameters to the bit and
-/// the same statistics. Throws NotFinite, with the policy as before that minibatch: at the minibatch on the host, at
-/// the end of the update on a device.
+/// the same statistics. Throws NotFinite if the loss or gradient of a minibatch is not finite: on the host at that
+/// minibatch, on a device at the end of the update. The policy is then as it was before that minibatch.
 UpdateStats ppo_update(const Learner& learner, Rollout* rollout, const TrainSection& config, const UpdateKey& key);
 
 }  // namespace pictura

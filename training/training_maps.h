@@ -13,11 +13,11 @@ namespace pictura {
 /// recorded scenes have simulator.max_agents agents each; SceneSets has their maps.
 std::vector<WorldSpec> draw_training_worlds(const Config& config);
 
-/// Configuration of those worlds: simulator_config(), and for recorded scenes their protocol's.
+/// Configuration of the worlds of draw_training_worlds(): simulator_config(), and for recorded scenes their protocol's.
 SimulatorConfig training_world(const Config& config, Device device);
 
-/// Maps of those worlds, as load_maps() takes them: simulator.maps, then their copies (simulator.map_copies), without
-/// copies that no world uses.
+/// Names of the maps of draw_training_worlds(), as load_maps() takes them: simulator.maps, then their copies
+/// (simulator.map_copies), without copies that no world uses.
 std::vector<std::string> training_maps(const Config& config);
 
 }  // namespace pictura
