@@ -24,7 +24,7 @@ struct SceneSection {
   std::string control;                // road users that the policy drives, instead of the protocol's
   std::vector<std::string> rules;     // "NAME=VALUE", instead of the protocol's, see set_scene_rule()
   int max_replayed = 96;              // road users that follow the recording, in a world
-  int64_t updates_per_set = 8;        // updates after which the worlds go on to the next scenes
+  int64_t updates_per_set = 8;        // updates after which the worlds take the next scenes
 
   /// Returns the protocol with these changes. Throws UsageError naming the key without its section.
   SceneProtocol training_protocol() const;

@@ -62,7 +62,7 @@ struct Run {
   Rig rig;                                       // current rig
   const std::unique_ptr<const Teacher> teacher;  // null without train.teacher
   const std::unique_ptr<Opponents> opponents;    // null without simulator.others.policies
-  const SimulatorConfig world;                   // of all worlds
+  const SimulatorConfig world;                   // configuration of all worlds
   const std::unique_ptr<SceneSets> scenes;       // null without recorded scenes
   const std::unique_ptr<Simulator> simulator;
   std::unique_ptr<Renderer> renderer;  // null for policies without images

@@ -26,7 +26,7 @@ std::shared_ptr<const CompiledMap> compile_training_scene(const SceneRef& scene,
 struct SceneSet {
   CompiledMaps maps;
   std::vector<WorldSpec> worlds;
-  uint64_t seed = 0;  // of the set's episodes
+  uint64_t seed = 0;  // seed of the set's episodes
 };
 
 /// Sets of scenes that the worlds of a run show in turn. World w of set k shows scene k W + w, where W is the number of
@@ -65,7 +65,7 @@ class SceneSets {
   std::vector<SceneRef> scenes_;
   std::vector<std::string> notices_;
   // Members of the thread that prepares.
-  Maps maps_;                  // of the last prepared set
+  Maps maps_;                  // maps of the last prepared set
   std::set<size_t> unusable_;  // scenes
   std::vector<std::string> new_notices_;
   int64_t next_number_ = -1;

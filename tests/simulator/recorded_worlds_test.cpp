@@ -126,7 +126,7 @@ TEST(RecordedWorlds, ReplayedTracksAreBoxesThatFollowTheRecord) {
   for (; !simulator->episode_over()[0]; ++step) {
     ASSERT_LT(step, config.episode_steps);
     for (int slot = 2; slot < kAgents; ++slot) ASSERT_EQ(status_of(*simulator, slot), AgentStatus::absent);
-    for (const int first : {kAgents, kAgents + config.parked_cars + 1}) {  // of either world's other boxes
+    for (const int first : {kAgents, kAgents + config.parked_cars + 1}) {  // other boxes of either world
       for (int i = 0; i < config.parked_cars; ++i) {
         SCOPED_TRACE(::testing::Message() << "box " << first + i << ", step " << step);
         const AgentBox& box = simulator->scene().agents[static_cast<size_t>(first + i)];
