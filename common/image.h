@@ -57,10 +57,10 @@ struct ImageLayout {
   std::size_t bytes() const { return static_cast<std::size_t>(num_values) * bytes_per_value(format); }
 };
 
-/// Throws Error unless num_views >= 0 and, where the order is patches, the patches are of 4, 8, 12 or 16 px.
+/// Throws Error unless num_views >= 0 and, if the order is patches, the patches are of 4, 8, 12 or 16 px.
 ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFormat format,
                          ChannelOrder order = ChannelOrder::planar, int patch_px = kDefaultPatch_px);
-/// Additionally throws Error where validate(rig) does.
+/// Variant for a rig's cameras; also throws the errors of validate(rig).
 ImageLayout image_layout(const Rig& rig, int64_t num_views, PixelFormat format,
                          ChannelOrder order = ChannelOrder::planar, int patch_px = kDefaultPatch_px);
 

@@ -15,7 +15,7 @@ namespace pictura {
 /// Point samples whose mean is a pixel's colour. Only `gl` uses them; the other renderers compute exact coverage.
 struct PixelSamples {
   int grid = 1;         // supersampling: grid x grid
-  int multisample = 1;  // MSAA with the driver's pattern; rounded up where the driver lacks this number
+  int multisample = 1;  // MSAA with the driver's pattern; rounded up if the driver lacks this number
   bool operator==(const PixelSamples&) const = default;
 };
 
@@ -73,17 +73,17 @@ class Renderer {
   virtual uint64_t generation() const { return 0; }
 
   /// Draws every camera of the rig for every view and writes each pixel of their images. Views at and beyond
-  /// views.num_views are neither read nor drawn, and their images are not written. Throws Error if an array lies on
-  /// the wrong device, where a handle, an index or the number of views is out of range, and where the images do not fit
-  /// the rig and all views. On a CUDA device, a view with an invalid world, handle, pose or range of hidden agents is a
-  /// latched fault, and its images are black. A wrong number of views is a latched fault too, and is clamped. Boxes,
-  /// egos and the order of ranges are checked only on the host; on a device the caller must ensure that they are valid.
+  /// views.num_views are neither read nor drawn, and their images are not written. Throws Error if an array lies on the
+  /// wrong device, if a handle, an index or the number of views is out of range, or if the images do not fit the rig
+  /// and all views. On a CUDA device, a view with an invalid world, handle, pose or range of hidden agents is a latched
+  /// fault, and its images are black. A wrong number of views is a latched fault too, and is clamped. Boxes, egos and
+  /// the order of ranges are checked only on the host; on a device the caller must ensure that they are valid.
   virtual void render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out,
                       Stream stream = {}) = 0;
 
   /// Computes for each query the coverage of the agent in the view's images over its coverage when drawn alone, summed
-  /// over the cameras, in [0, 1]. The result is NaN where the agent is in no camera's frame, and for a view at or
-  /// beyond views.num_views. `visibility_out` has the length of `queries`.
+  /// over the cameras, in [0, 1]. The result is NaN if the agent is in no camera's frame, and for a view at or beyond
+  /// views.num_views. `visibility_out` has the length of `queries`.
   virtual void visibility(const SceneBatch& scene, const ViewBatch& views, Span<const VisibilityQuery> queries,
                           Span<float> visibility_out, Stream stream = {}) = 0;
 

@@ -49,8 +49,8 @@ AgentBox make_box(AgentClass agent_class, Vec3 center_m, float heading_rad, Vec3
 /// Makes a view at a pose; it hides no agent.
 View make_view(Vec3 origin_m, float heading_rad);
 
-/// Views of a call. Where num_views is given, it lies with the views, on their device, and only views [0, *num_views)
-/// are read. So a list that was compacted on a device is drawn without the host.
+/// Views of a call. If num_views is given, it lies on the device of the views, and only views [0, *num_views) are read.
+/// So a list of views that a device compacted can be drawn without waiting for the host.
 struct ViewBatch {
   Span<const View> views;
   const int32_t* num_views = nullptr;

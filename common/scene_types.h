@@ -105,7 +105,7 @@ enum Hides : uint32_t {
 };
 
 /// Key of the randomization of a view's cameras (common/raster/randomize_camera.h), like the keys of random numbers
-/// (common/rng.h). With the same key, a redrawn image is the same.
+/// (common/rng.h). An image that is drawn again with the same key has the same bits.
 struct ViewKey {
   uint32_t world = 0;  // global
   uint32_t agent = 0;  // index in its world, below RandomKey::kMaxAgents

@@ -15,5 +15,5 @@ inline void check_cuda(cudaError_t status, const char* what) {
 
 }  // namespace pictura
 
-/// Throws Error naming the call where the call fails.
+/// Throws Error naming the CUDA call if the call fails.
 #define PICTURA_CUDA(call) ::pictura::check_cuda((call), #call)

@@ -61,7 +61,7 @@ class DeviceScene {
 /// images have.
 class DeviceImages {
  public:
-  /// Allocates images like the host's on the current device.
+  /// Allocates, on the current device, images of the same sizes, format and planes as `host`.
   ImageBatch like(const ImageBatch& host) {
     std::vector<ImageSize> sizes;
     for (const CameraImages& camera : host.cameras) sizes.push_back({camera.width_px, camera.height_px});
@@ -86,7 +86,7 @@ class DeviceImages {
   /// All colour bytes of the images that like() allocated.
   Span<uint8_t> color_bytes() const { return color_bytes_; }
 
-  /// Copies the images that like() allocated to host images of at most as many views, on the stream.
+  /// Copies the images, which like() allocated, into host images of at most as many views, on the stream.
   void copy_to_host(const ImageBatch& host, cudaStream_t stream = nullptr) const {
     const auto views = static_cast<std::size_t>(host.num_views);
     auto copy = [&](void* to, const void* from, std::size_t bytes) {

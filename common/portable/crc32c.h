@@ -1,4 +1,4 @@
-// The processor's CRC-32C instruction, where the compiler may use it (SSE 4.2, which x86-64-v3 includes).
+// The processor's CRC-32C instruction, if the compiler may use it (SSE 4.2, which x86-64-v3 includes).
 #pragma once
 
 #include "pictura/common/portable/hd.h"

@@ -38,7 +38,7 @@ PICTURA_HD inline float float_from_bits(uint32_t bits) {
 #endif
 }
 
-/// Minimum and maximum, one instruction on either device. Arguments must not be NaN: where one is NaN, a device returns
+/// Minimum and maximum, one instruction on either device. Arguments must not be NaN: if one is NaN, a device returns
 /// the other argument and a host returns b. Of +0 and -0, either may be returned.
 PICTURA_HD inline float min_no_nan(float a, float b) {
 #if defined(__CUDA_ARCH__)

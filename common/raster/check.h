@@ -36,7 +36,7 @@ Span<const View> counted_views(std::string_view renderer, const ViewBatch& views
 /// Throws Error unless the number of answers equals the number of visibility queries.
 void check_answers(std::string_view renderer, std::size_t num_queries, std::size_t num_answers);
 
-/// Throws Error unless each query's view is below max_views and there are as many answers as queries. Where the view is
+/// Throws Error unless each query's view is below max_views and there are as many answers as queries. If the view is
 /// one of `views`, which check_views accepted, the query's agent must be of that view's world.
 void check_queries(std::string_view renderer, const SceneBatch& scene, Span<const View> views, std::size_t max_views,
                    Span<const VisibilityQuery> queries, std::size_t num_answers);

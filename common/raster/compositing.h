@@ -86,10 +86,11 @@ class PixelAccumulator {
   Part part_[kNumKinds];
 };
 
-/// Divides the remainder of a pixel among the fragments that cover it fully, by each fragment's remaining samples. If
-/// none has any, they are divided as if there were no other fragments. for_each(visit) calls visit(coverage, &visible)
-/// for each fragment, where `visible` are the samples that occlude_pair left of it. For fully covering fragments, this
-/// function removes the samples that other fragments hide. With fewer than two such fragments, nothing changes.
+/// Divides the remainder of a pixel among the fragments that cover the pixel fully, by each fragment's remaining
+/// samples. If no such fragment has remaining samples, the remainder is divided as if there were no other fragments.
+/// for_each(visit) calls visit(coverage, &visible) for each fragment, where `visible` are the samples that occlude_pair
+/// left of it. For fully covering fragments, this function removes the samples that other fragments hide. With fewer
+/// than two such fragments, nothing changes.
 template <typename ForEach>
 PICTURA_HD inline void divide_remainder(ForEach&& for_each) {
   uint64_t hidden = 0, left = 0;

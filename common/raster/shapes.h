@@ -70,7 +70,7 @@ PICTURA_HD inline unsigned front_facing_mask(const AgentBox& box, Vec3 eye_m) {
 }
 
 /// The four corners of a face of a box, in world coordinates. Corners 0 to 3 of the box are front left, rear left, rear
-/// right and front right on the ground; 4 to 7 are the same on the roof.
+/// right and front right on the ground; corners 4 to 7 are above them, on the roof.
 PICTURA_HD inline void cuboid_face_corners(const AgentBox& box, int face, Vec3* corners_out) {
   const Vec2 ahead{box.cos_heading, box.sin_heading};
   const Vec2 along = ahead * (0.5f * box.length_m), across = left_normal(ahead) * (0.5f * box.width_m);

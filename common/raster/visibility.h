@@ -310,7 +310,7 @@ PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFac
 
 /// Whether two fragments, at least one of them a sliver, together fill a pixel exactly: neighbouring surfaces that meet
 /// there. The tolerance equals the accuracy of their areas; a larger tolerance would take slivers of hidden surfaces
-/// for neighbours. A fragment that covers the pixel alone has no neighbour there.
+/// for neighbours. A fragment that fills the pixel by itself has no neighbour there.
 PICTURA_HD inline bool are_complementary(const PixelCoverage& a, const PixelCoverage& b) {
   constexpr float kExact = 1e-5f;
   return (a.samples == 0 || b.samples == 0) && max_of(a.area, b.area) < 1.0f && fabsf(a.area + b.area - 1.0f) < kExact;
@@ -328,9 +328,9 @@ struct OccludedSamples {
   uint64_t of_a = 0, of_b = 0;
 };
 
-/// Samples that two fragments of different primitives occlude of each other. `shared` are the samples that they share,
-/// `a_first` those of them at which a is in front. A sliver occludes nothing and is occluded as a whole. A fragment
-/// that covers the whole pixel is occluded only by another such fragment (see PixelAccumulator).
+/// Samples that two fragments of different primitives occlude of each other. `shared` are the samples that both
+/// fragments cover, `a_first` the shared samples at which a is in front. A sliver occludes nothing and is occluded as a
+/// whole. A fragment that covers the whole pixel is occluded only by another such fragment (see PixelAccumulator).
 PICTURA_HD inline OccludedSamples occluded_samples(const PixelCoverage& a, const PixelCoverage& b, uint64_t shared,
                                                    uint64_t a_first) {
   if (a.samples == 0 || b.samples == 0) {

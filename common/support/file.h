@@ -14,8 +14,9 @@ namespace pictura {
 constexpr std::size_t kPrefix_bytes = 64;
 
 /// Returns the bytes of a file. Throws Error naming the path and the reason for folders, for files above max_bytes, and
-/// for files whose size or modification time changes during reading. Throws Interrupted while it waits for a FIFO's
-/// writer. `check`, which may throw, gets the first kPrefix_bytes (fewer for a shorter file) before more is read.
+/// for files whose size or modification time changes during reading. Throws Interrupted if a signal ends the wait for a
+/// FIFO's writer. `check`, which may throw, gets the first kPrefix_bytes (fewer for a shorter file) before more is
+/// read.
 std::string read_file(const std::string& path, std::size_t max_bytes = std::size_t{1} << 30,
                       const std::function<void(std::string_view first)>& check = {});
 

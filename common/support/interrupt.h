@@ -23,8 +23,8 @@ inline bool interrupted() { return interrupting_signal() != 0; }
 /// Throws Interrupted if a signal is recorded.
 void throw_if_interrupted();
 
-/// A piece of work that a signal stops. A signal from before the work began does not stop it: such work is part of an
-/// orderly end, such as plotting the curve learnt so far.
+/// A piece of work that a signal stops, unless a signal came before the work began: work that begins after a signal is
+/// part of an orderly end, such as plotting the curve learnt so far.
 class InterruptibleWork {
  public:
   /// `message` describes the interrupted work.

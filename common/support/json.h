@@ -11,7 +11,7 @@ namespace pictura {
 /// JSON values whose keys keep the order of insertion.
 using Json = nlohmann::ordered_json;
 
-/// Returns the number, or null where it is infinite or NaN.
+/// Returns the number, or null if it is infinite or NaN.
 inline Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 /// Maximum nesting depth of text, far above all that pictura writes or reads. The library writes, copies and compares
@@ -38,8 +38,8 @@ inline size_t first_too_deep(std::string_view text) {
   return std::string_view::npos;
 }
 
-/// The only parser of JSON from outside. Throws the library's parse_error where the text is not JSON or is nested
-/// deeper than kMaxJsonDepth; without exceptions, the returned value is discarded then.
+/// The only parser of JSON from outside. Throws the library's parse_error if the text is not JSON or is nested deeper
+/// than kMaxJsonDepth. If allow_exceptions is false, returns a value with is_discarded() instead.
 template <typename Value = Json>
 Value parse_json(std::string_view text, bool allow_exceptions = true) {
   const size_t too_deep = first_too_deep(text);

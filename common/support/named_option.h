@@ -11,7 +11,7 @@ namespace pictura {
 /// An option, with the details that its type and default do not give.
 struct NamedOption {
   std::string name;                                        // in Python
-  const char *flag = nullptr, *help = nullptr;             // in commands, where it has one
+  const char *flag = nullptr, *help = nullptr;             // in commands; null: no flag
   double low = 0, high = std::numeric_limits<int>::max();  // range of the flag's numbers
 };
 

@@ -31,8 +31,8 @@ class Descriptor {
 /// tests, a hidden file beside the target; if its writer is killed, the next writer into that folder removes it.
 enum class Staging { unnamed, named };
 
-/// Whether a name is that of such a hidden file: .pictura-*.tmp with 16 random hexadecimal digits, unlike any name that
-/// a user would choose.
+/// Whether a name is that of a hidden file of Staging::named: .pictura-*.tmp with 16 random hexadecimal digits, unlike
+/// any name that a user would choose.
 bool is_temporary_name(std::string_view name);
 
 class OutputFile {
@@ -53,7 +53,7 @@ class OutputFile {
   int fd() const { return staged_.get(); }
 
   /// Moves the written bytes to the target's place after syncing them to disk. Waits for a FIFO's reader. Throws Error
-  /// naming the path, and Interrupted while it waits.
+  /// naming the path, and Interrupted if a signal ends the wait.
   void commit();
 
  private:

@@ -14,7 +14,7 @@ namespace pictura {
 /// when more than a third of the word's letters would have to change.
 std::string nearest_word(std::string_view word, const std::vector<std::string>& known);
 
-/// Returns "; did you mean 'NEAREST'?", or an empty text where no known word is near.
+/// Returns "; did you mean 'NEAREST'?", or an empty text if no known word is near.
 std::string suggestion(std::string_view word, const std::vector<std::string>& known);
 
 /// Returns the index of a word in `known`. Throws UsageError listing the known words: "WHAT: expected a, b, got 'c'".

@@ -25,8 +25,8 @@ std::optional<int64_t> whole_number(const toml::node& node);
 /// Formats a value for messages, in one short line.
 std::string format_value(const toml::node& node);
 
-/// One table. Readers with a fallback return it where the key is missing; other readers throw. All throw Error for a
-/// wrong type or range. The table must outlive the object.
+/// One table. Readers with a fallback return the fallback if the key is missing; other readers throw Error. All readers
+/// throw Error for a wrong type or range. The table must outlive the object.
 class TomlFields {
  public:
   struct Range {
