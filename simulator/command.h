@@ -10,7 +10,7 @@ enum class CommandKind : int32_t {
   action,           // drives by its dynamics
   kinematic_state,  // is placed at a pose and speed, such as those of a recorded trajectory
   absent,           // leaves its world's episode
-  recorded,         // follows the record of its world's scene, or is absent where the record has no state
+  recorded,         // follows the record of its world's scene; absent at steps without a recorded state
 };
 
 /// Command of one slot for one step. Except for `recorded`, commands to agents that are neither active nor recorded are
@@ -24,9 +24,9 @@ enum class CommandKind : int32_t {
 /// - absent: from this step until the end of the episode the agent is AgentStatus::absent: it is not drawn, does not
 ///   collide, and is not valid. It counts among the inactive agents that end an episode.
 /// - recorded: the agent is AgentStatus::recorded. After step n of the episode it has the state of its record n steps
-///   after the start. Where the record has no state, it is absent until a step with a state. After the record's end it
-///   keeps its last pose. It has no infractions, passes no waypoint and is not valid; other agents can collide with it.
-///   Absent agents return; halted agents remain halted. Only in worlds on a map with a record (compile_scenario()).
+///   after the start. At steps without a recorded state it is absent. After the record's end it keeps its last pose. It
+///   has no infractions, passes no waypoint and is not valid; other agents can collide with it. Absent agents return;
+///   halted agents remain halted. Only in worlds on a map with a record (compile_scenario()).
 struct Command {
   CommandKind kind = CommandKind::action;
   int32_t action = kIdleAction;

@@ -53,7 +53,7 @@ struct MapRules {
   CellLists near_lane_pieces, near_boundary_pieces, near_wall_pieces, near_stop_lines;
   Vec2 low_m, high_m;
   MapRecord record;
-  SideEdges sides;  // filled where the map has a record
+  SideEdges sides;  // filled if the map has a record
   float max_box_radius_m = 0, max_speed_mps = 0;
   bool is_open = false;
 

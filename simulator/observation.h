@@ -38,7 +38,7 @@ enum class ObservationPart : uint8_t { own, sets, walls };
   X(conditioning, float, 1, kNumConditioning, ObservationPart::own, "scaled; see docs/reference/observation.md") \
   X(waypoints, float, kNumWaypoints, kWaypointFeatures, ObservationPart::own, "ego frame")
 
-/// Observations of all slots. Entity sets are padded with zeros beyond their counts, and empty where they are not
+/// Observations of all slots. Entity sets are padded with zeros beyond their counts, and empty if they are not
 /// computed.
 struct ObservationView {
 #define X(name, type, rows, features, part, comment) Span<type> name;

@@ -24,10 +24,10 @@ constexpr float kRecordedHeadAhead_m = 15.0f, kRecordedHeadHeight_m = 5.0f;
 std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenario> scenario,
                                                     const MapOptions& options = {}, int32_t start_step = 0);
 
-/// Returns a scene's map for worlds of num_agents agents or fewer, which are the driven tracks in this order, then
-/// agents that are never present. The replayed tracks are no agents: they are the first of the worlds' other boxes, of
-/// which there are SimulatorConfig::parked_cars, and follow their records. An episode of such a world has only agents
-/// that are present at its start. Throws UsageError unless 1 <= driven.size() <= num_agents.
+/// Returns a scene's map for worlds of at most num_agents agents: the driven tracks in this order, then agents that are
+/// never present. The replayed tracks are not agents: they are the first of a world's other boxes, whose number is
+/// SimulatorConfig::parked_cars, and follow their records. An episode has only agents that are present at its start.
+/// Throws UsageError unless 1 <= driven.size() <= num_agents.
 std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<const int32_t> driven,
                                                Span<const int32_t> replayed, int num_agents);
 
@@ -47,8 +47,8 @@ std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& word
 /// Variant of tracks_of() without tracks that are absent at a step. Also throws UsageError when no track remains.
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words, int32_t step);
 
-/// Distance on the ground from a box's centre to the recorded place of the track at a step; nullopt where the track has
-/// no recorded state.
+/// Distance on the ground from a box's centre to the recorded place of the track at a step; nullopt if the track has no
+/// recorded state at that step.
 std::optional<float> displacement_m(const Scenario& scenario, int32_t track, int32_t step, Vec3 center_m);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
 // Worlds outside their simulator. Saved states of the worlds of one run are joined and split, so that another number of
-// simulators can restore them. Single worlds are kept to continue in other simulators.
+// simulators can restore them. Single worlds can be kept and continued in other simulators.
 #pragma once
 
 #include <memory>

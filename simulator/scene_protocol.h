@@ -19,7 +19,7 @@ enum class RecordEnd : uint8_t { stand, vanish };
 enum class Waypoints : uint8_t { goal, path };
 
 /// Protocol: the driven road users, their goals, and the treatment of events. The default values are the paper's
-/// (zero-shot evaluation, appendix B). Where the paper states none, they are this project's choice;
+/// (zero-shot evaluation, appendix B). If the paper states no value, the default is this project's choice;
 /// docs/explanation/evaluation.md lists these choices.
 struct SceneProtocol {
   std::string name = "womd";

@@ -16,11 +16,11 @@ namespace pictura {
 /// lights as recorded lights.
 class SceneRecorder final : public StepObserver {
  public:
-  /// Records the simulator's state as the first step; the simulator must outlive the recorder. Throws UsageError where
-  /// the simulator does not work in host memory or has no such world.
+  /// Records the simulator's state as the first step; the simulator must outlive the recorder. Throws UsageError if the
+  /// simulator does not work in host memory or lacks the world.
   explicit SceneRecorder(Simulator& simulator, int world = 0);
 
-  /// Records a step of the episode; steps after the episode are ignored. Throws Error if a scene would become too
+  /// Records a step of the episode; steps after the episode are ignored. Throws Error if the scene would become too
   /// long.
   void after_step(const StepResult& result) override;
   void after_reset(Span<const uint8_t> world_mask) override;

@@ -51,7 +51,7 @@ struct SimulatorConfig {
   OtherShares others{};
   bool auxiliary_observations = true;  // false: the auxiliary slots hold zeros (the like-for-like baseline)
   bool vector_observations = true;     // false: entity sets are not computed (perspective training)
-  bool wall_observations = false;      // whether sets of walls are observed; empty where walls are off
+  bool wall_observations = false;      // whether sets of walls are observed; empty if walls are off
   std::array<ConditioningRange, kNumConditioning> conditioning = default_conditioning();
 
   static std::array<ConditioningRange, kNumConditioning> default_conditioning();
@@ -73,8 +73,8 @@ constexpr const char* name_of(LightCycles cycles) { return kLightCyclesNames[sta
 /// Returns the light cycles with a name of kLightCyclesNames. Throws UsageError listing the names.
 LightCycles light_cycles_named(std::string_view name);
 
-/// Returns the type of light cycles of a map in worlds of this configuration: the name of its light cycles, "recorded"
-/// where the map has recorded lights, "none" where it has no lights.
+/// Returns the type of light cycles of a map in worlds of this configuration: "recorded" if the map has recorded
+/// lights, "none" if it has no lights, else the name of the configuration's light cycles.
 std::string light_cycles_text(const SimulatorConfig& config, const CompiledMap& map);
 
 /// One world: its map among the simulator's maps, and the requested number of controlled agents.
@@ -93,8 +93,8 @@ std::vector<WorldSpec> draw_worlds(uint64_t seed, int num_slots, int min_agents,
 struct SimulatorCapacity {
   int64_t worlds = 0, slots = 0;
   int64_t lights = 0;     // traffic lights of all worlds
-  int64_t maps = 0;       // at the same time
-  int64_t map_bytes = 0;  // bytes of the rules of all maps
+  int64_t maps = 0;       // maps held at the same time
+  int64_t map_bytes = 0;  // size of the data that rules read, for all maps
 
   /// Returns the number of controlled agents and parked cars.
   int64_t boxes(const SimulatorConfig& config) const { return slots + worlds * config.parked_cars; }
@@ -175,7 +175,7 @@ class Simulator {
 
   /// Replaces the worlds and maps, at the start of the first episodes of `seed`: bit for bit as in a new simulator of
   /// this configuration, seed, maps and worlds. handles [maps], or empty for 0, 1, ... Memory is reused; on a device,
-  /// nothing is allocated where the capacity suffices, and maps that are already present are not copied again. Captured
+  /// nothing is allocated if the capacity suffices, and maps that are already present are not copied again. Captured
   /// graphs and controllers of the previous worlds become stale. May wait for the stream. Throws as make_simulator
   /// does, and then leaves everything unchanged.
   virtual void set_worlds(CompiledMaps maps, std::vector<GeometryHandle> handles, std::vector<WorldSpec> worlds,
@@ -259,10 +259,10 @@ class Simulator {
   // Implementation of step() after all checks except those of values.
   virtual StepResult step_actions(Span<const int32_t> actions, Stream stream) = 0;
   virtual StepResult step_commands(Span<const Command> commands, Stream stream) = 0;
-  // Implementations of reset() and set_state() after these checks. An empty mask: all worlds.
+  // Implementations of reset() and set_state() after their checks of arrays. An empty mask: all worlds.
   virtual void reset_worlds(Span<const uint8_t> world_mask, uint64_t seed, Stream stream) = 0;
   virtual void apply_edit(const StateEdit& edit, Stream stream) = 0;
-  // Implementation of observe() after these checks.
+  // Implementation of observe() after its checks of arrays.
   virtual void answer_queries(const ObservationQueries& asked, Stream stream) = 0;
 
   std::string_view name_;

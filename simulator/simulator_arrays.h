@@ -29,8 +29,8 @@ struct SimulatorArrays {
   Span<const uint8_t> driver;  // [slots] driver of the agent in this episode, see driver_of() in rules/impairment.h
   Span<const View> views;      // [slots] poses of the agents' cameras, see Simulator::views()
   AgentStateView state{};
-  // [worlds] number of steps in the current episode, index of that episode, and 1 where it has ended, so that the next
-  // step begins another episode.
+  // [worlds] number of steps in the current episode, index of that episode, and 1 if the episode has ended, so that the
+  // next step begins another episode.
   Span<const int32_t> episode_step, episode_index;
   Span<const uint8_t> episode_over;
   Span<const SimulatorTotals> world_totals;  // [worlds]

@@ -17,7 +17,7 @@ struct Walkways {
 };
 
 /// Makes the walkways of a map. Pieces on the drivable surface of `roads` (its lanes and their cells) are omitted,
-/// except on crosswalks; so are networks shorter than kMinWalk_m. Empty where the map has no walkways.
+/// except on crosswalks; so are networks shorter than kMinWalk_m. Empty if the map has no walkways.
 Walkways make_walkways(const RoadMap& map, const MapView& roads);
 
 constexpr float kMinWalk_m = 40.0f;

@@ -15,8 +15,8 @@ class DrivenAgent {
   Motion now() const { return motion_of(world_.agents, slot_); }
   /// Motion one step later.
   Motion after(const Motion& from, int32_t action) const;
-  /// Returns the action without lateral jerk that brings the agent nearest to a speed; adding 0, 1 or 2 - kStraight
-  /// steers.
+  /// Returns the action without lateral jerk that brings the agent nearest to a speed. To steer, add k - kStraight,
+  /// where k is 0, 1 or 2.
   int32_t speed_action(const Motion& from, float wanted_mps) const;
   static constexpr int32_t kStraight = 1;
 

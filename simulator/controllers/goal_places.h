@@ -15,7 +15,7 @@ RoutePoint start_place(const WorldView& world, int agent);
 /// Returns the waypoints of chain `chain` of the agent's life, which starts at `from`.
 std::array<RoutePoint, kNumWaypoints> goal_places(const WorldView& world, int agent, uint32_t chain, RoutePoint from);
 
-/// Returns the place on the graph's lanes, whose lengths differ by rounding from those of the map's rules.
+/// Converts `at` to a place on the graph's lanes, whose lengths differ by rounding from those of the map's rules.
 LanePosition lane_place(const MapView& map, const LaneGraph& graph, RoutePoint at);
 
 struct GoalReach {

@@ -26,12 +26,12 @@ bool drives_on_host(std::string_view name);
 /// a map without one, because recorded lanes end.
 void check_worlds(std::string_view controller, const Simulator& simulator);
 
-/// Makes a controller. Throws UsageError listing the known names, or Error where the simulator's memory is not on the
+/// Makes a controller. Throws UsageError listing the known names, or Error if the simulator's memory is not on the
 /// host.
 std::unique_ptr<Controller> make_host_controller(const std::string& name, const Simulator& simulator, uint64_t seed);
 
-/// Throws Error naming the controller unless commands and a nonempty mask have one element per slot and the input lies
-/// on `device`.
+/// Throws Error naming the controller unless `commands`, and the mask if it is not empty, have one element per slot and
+/// the input lies on `device`.
 void check_controller_arrays(std::string_view who, const SimulatorArrays& input, Device device,
                              Span<const uint8_t> mask, Span<const Command> commands);
 

@@ -38,8 +38,8 @@ struct FollowedPath {
   /// Adds a place, unless it is too near to the last place.
   void add(Vec3 point_m, float its_heading_rad);
   float length_m() const { return s_m.back(); }
-  /// Returns the arc length of the place nearest to p, on the pieces from `from_s_m` on and the piece that ends just
-  /// before.
+  /// Returns the arc length of the place nearest to p, on the pieces from `from_s_m` on, including a piece that ends
+  /// just before `from_s_m`.
   float nearest_m(Vec2 p, float from_s_m) const;
   struct Pose {
     Vec3 position_m;
@@ -50,9 +50,9 @@ struct FollowedPath {
 
 /// Returns a path from a pose onto the centre line of the lane and along the lanes that follow, for kAhead_m or to the
 /// end of the lanes. The path takes the straightest way at forks. After endless lanes, only endless lanes follow. At a
-/// lane without successors, the path changes to the nearest lane beside it with successors. Without room for that, the
-/// path ends where the front bumper, front_m ahead of the reference point, is before the lane's end. Without a lane
-/// (-1), the path is the pose alone.
+/// lane without successors, the path changes to the nearest lane beside it with successors. If there is no room for the
+/// change, the path ends where the front bumper, front_m ahead of the reference point, is before the lane's end.
+/// Without a lane (-1), the path is the pose alone.
 FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m, float heading_rad, float front_m);
 
 enum class IdmPaths {

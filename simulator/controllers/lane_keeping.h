@@ -1,7 +1,7 @@
 // The lane keeper: a controller for vehicles and cyclists in traffic. It follows its waypoints, stops at red lights and
 // behind other road users, even if these halt at once, and gives way when it changes lanes. It pursues the path of its
-// lanes. Where that would leave the road, since long cars cut corners, it follows a plan that stays on the road;
-// without a plan, it stops. Host only.
+// lanes. If it would leave the road on this path, since long cars cut corners, it follows a plan that stays on the
+// road; without a plan, it stops. Host only.
 #pragma once
 
 #include <array>
@@ -96,7 +96,7 @@ class LaneKeepingController final : public Controller {
   ~LaneKeepingController() override;
 
   std::string_view name() const override { return "lane"; }
-  /// Also throws Error where a world is in the middle of an episode whose first step this controller has not seen.
+  /// Also throws Error if a world is in the middle of an episode whose first step this controller has not seen.
   void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
            Stream stream = {}) override;
   /// Returns null for pedestrians, for absent agents, and before the first act().

@@ -44,7 +44,7 @@ class LanePath {
 
   /// Removes the points after point `last`.
   void cut(size_t last);
-  /// Extends the path to a place. Returns false where no route leads there, or where lane changes lack room even with
+  /// Extends the path to a place. Returns false if no route leads to the place, or if lane changes lack room even with
   /// detours; the path is then extended elsewhere.
   bool go_to(RoutePoint to);
   /// Extends the path as far as lanes continue, taking the straightest way at forks. From a lane that ends, it changes

@@ -20,9 +20,9 @@ struct Driver {
 /// Makes a driver with a mask on the host.
 Driver driver_of(std::unique_ptr<Controller> controller, std::vector<uint8_t> mask);
 
-/// Runs all drivers in their order: where two drivers command a slot, the later one prevails. It can be captured in
-/// graphs if all drivers can. The mask of act() excludes further slots; it must be empty where drivers have masks of
-/// their own.
+/// Runs all drivers in their order: if two drivers command a slot, the later one prevails. act() can be captured in
+/// graphs if that holds for all drivers. The mask of act() excludes further slots; it must be empty if a driver has a
+/// mask of its own.
 class SharedControl final : public Controller {
  public:
   /// Throws UsageError for an empty list of drivers.

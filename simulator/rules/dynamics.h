@@ -1,5 +1,6 @@
 // Jerk-controlled kinematic bicycle: actions are longitudinal and lateral jerks, and the state moves along an arc about
-// the rear axle (Gigaflow's dynamics; formulae after the public reference of the paper's vectorised core).
+// the rear axle (Gigaflow's dynamics; the formulae follow the public reference implementation of the paper's vectorised
+// simulator).
 #pragma once
 
 #include "pictura/common/math.h"

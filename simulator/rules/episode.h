@@ -37,9 +37,9 @@ PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType&
          driver_kind_of(world, agent) == 0;
 }
 
-/// Whether the agent counts as driving in the decision whether an episode ends. Agents that wait to enter count, and so
-/// do agents that follow a record, even where the record has no state; but where some tracks are replayed, all agents
-/// are there from the start.
+/// Whether the agent counts as driving when a world decides whether its episode ends. Agents that wait to enter count.
+/// Agents that follow a record count even at steps without a recorded state, unless some tracks are replayed: then all
+/// agents are present from the start.
 PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
   const auto status = world.agents.status[world.first_slot + agent];
   if (has_replayed_tracks(world.map)) return takes_actions(status);

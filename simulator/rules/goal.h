@@ -24,7 +24,8 @@ PICTURA_HD inline RoutePoint neighbor_of(const MapView& map, RoutePoint at, int 
 }
 
 /// Returns the point beside `at` on the nearest lane with a successor, over as many lane changes as needed; of two
-/// equally near lanes, the left. Returns `at` itself where its own lane has a successor, or no lane beside it has one.
+/// equally near lanes, the left. Returns `at` itself if its own lane has a successor, or if no lane beside it has a
+/// successor.
 PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
   const auto goes_on = [&map](RoutePoint p) { return map.lanes[p.lane].num_successors > 0; };
   RoutePoint left = at, right = at;

@@ -25,8 +25,8 @@ PICTURA_HD constexpr ClassLimits class_limits(AgentClass agent_class) {
   }
 }
 
-/// Maximum speed of all classes. Recorded traffic may be faster: rules ask the map (MapView::max_speed_mps,
-/// max_box_radius_m).
+/// Maximum speed of all classes. Recorded traffic may be faster and larger: rules read the limits of the map
+/// (MapView::max_speed_mps, max_box_radius_m).
 constexpr float kMaxSpeed_mps = 20.0f;
 /// Maximum half-diagonal of a box of any class.
 constexpr float kMaxBoxRadius_m = 3.2f;

@@ -1,7 +1,7 @@
 // Map data that rules read: flat arrays and cell lists that both devices can hold. simulator/map_rules.h makes them
-// from a RoadMap. There are two kinds of cell lists. `*_cells` list, for the one cell of a point, all items within
-// reach of any point in the cell. `near_*` list the items that may be observed from the cell, nearest to the cell's
-// centre first.
+// from a RoadMap. There are two kinds of cell lists. `*_cells` list for each cell all items within reach of any point
+// in the cell, so that a query at a point reads one cell. `near_*` list for each cell the items that may be observed
+// from it, nearest to the cell's centre first.
 #pragma once
 
 #include "pictura/common/cells_around.h"
@@ -146,7 +146,7 @@ struct MapView {
   Span<const int32_t> walk_leaving;
   Span<const ParkingSpot> parking_spots;
   Span<const ObservedPiece> lane_pieces, boundary_pieces, wall_pieces;
-  Span<const Vec2> lane_middles, boundary_middles, wall_middles;  // the pieces' middles, in a quarter of the bytes
+  Span<const Vec2> lane_middles, boundary_middles, wall_middles;  // copies of the pieces' middle_m (x, y)
   GridView segment_cells, edge_cells, wall_cells, stop_line_cells;
   GridView walk_cells;                                                // cells of pairs of walk_pieces
   GridView near_lane_pieces, near_boundary_pieces, near_wall_pieces;  // per cell and sector

@@ -71,11 +71,12 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
     const bool is_near = reach < kPartnerRange_m;
     int found = 0;
     for (int y = range.y0; y <= range.y1 && is_near; ++y) found += range.end(cells, y) - range.begin(cells, y);
-    // At most half of the boxes in the cells are within reach.
+    // Usually at most half of the boxes in the cells are within reach, so fewer than 2 * kMaxPartners are too few.
     if (is_near && found < 2 * kMaxPartners) continue;
     Nearest nearest;
     if constexpr (ThreadGroup::kSize == 1) {
-      // Rows of cells are contiguous. Boxes beside the range are read too where that costs less than a loop per row.
+      // Rows of cells are contiguous. Boxes outside the range's columns are read too if that costs less than a loop per
+      // row.
       const bool at_once = range.end(cells, range.y1) - range.begin(cells, range.y0) <= kFew;
       for (int y = range.y0; y <= range.y1; ++y) {
         const int32_t begin = range.begin(cells, y);

@@ -89,14 +89,14 @@ PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const
   world.boxes_before[agent] = goes_on ? before : world.boxes[agent];
 }
 
-/// State of the replayed track of box num_agents + i, `step` steps after its episode's start; absent where the map has
+/// State of the replayed track of box num_agents + i, `step` steps after its episode's start; absent if the map has
 /// fewer replayed tracks.
 PICTURA_HD inline RecordedState replayed_state(const MapView& map, int i, int step) {
   const int agent = map.first_replayed + i;
   return agent < static_cast<int>(map.recorded_agents.size()) ? recorded_state(map, agent, step) : RecordedState{};
 }
 
-/// Places box num_agents + i, of a replayed track, where its record has it `step` steps after the episode's start, or
+/// Places box num_agents + i, of a replayed track, at its recorded state `step` steps after the episode's start, or
 /// nowhere. Only the first thread of the group writes.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void replay_track(const WorldView& world, int i, int step, const ThreadGroup& group = {}) {

@@ -131,10 +131,11 @@ PICTURA_HD inline bool is_lane_change(const MapView& map, int32_t before, int32_
 }
 
 /// Whether the step violates stop line `light`. `state` is the light's state during the step, which the agent observed
-/// before it. A violation requires red and one of two events: the front bumper crosses the line, or the agent changes
-/// from a lane without a light into a lane of this light with its bumper already past the line. Both must occur on the
-/// line's level, with a heading within 45 degrees of its traffic, and within 10 m of its middle. Standing on a line
-/// that turns red, clearing the junction behind it, and entering the next lane of the route are no violations.
+/// before it. A violation requires red and either of two events: the front bumper crosses the line, or the agent
+/// changes from a lane without a light into a lane of this light with its bumper already past the line. Either event
+/// counts only on the line's level, with a heading within 45 degrees of the line's traffic, and within 10 m of the
+/// line's middle. Standing on a line that turns red, clearing the junction behind it, and entering the next lane of the
+/// route are no violations.
 PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossing& crossing, LightState state) {
   if (state != LightState::red) return false;
   const StopLine& line = map.stop_lines[light];

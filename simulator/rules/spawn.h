@@ -324,8 +324,8 @@ PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const ThreadG
   return fits_map(map, box, group) && (box.agent_class == AgentClass::pedestrian || !straddles_stop_line(map, box));
 }
 
-/// Whether the agent that chose try `i` is part of the episode; -1 means that it found no place. Recorded agents are;
-/// where some tracks are replayed, only agents that are present at the start.
+/// Whether the agent that chose try `i` is part of the episode; -1 means that it found no place. Recorded agents are
+/// part of it; if some tracks are replayed, only the agents that are present at the start.
 PICTURA_HD inline bool joins_episode(const WorldView& world, int agent, int i) {
   if (has_replayed_tracks(world.map)) return has_body(world.agents.status[world.first_slot + agent]);
   return i >= 0 || has_record(world.map);

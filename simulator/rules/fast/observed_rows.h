@@ -23,7 +23,7 @@ struct RowFrame {
   }
 
  private:
-  // x + -0 is x, even where x is -0.
+  // x + -0 is x, even if x is -0.
   PICTURA_HD RowFrame(const EgoFrame& frame, Vec3 second_origin_m)
       : minus_origin(set8(-frame.origin_m.x, -frame.origin_m.y, -frame.origin_m.z, -0.0f, -second_origin_m.x,
                           -second_origin_m.y, -second_origin_m.z, -0.0f)),
