@@ -13,7 +13,8 @@ namespace pictura {
 /// Appends a number in groups of 7 bits, lowest group first; small numbers of either sign are short.
 void put_number(int32_t value, std::string* bytes_inout);
 
-/// Reads the numbers written by put_number(). Throws Error if the bytes end, or hold no such number.
+/// Reads the numbers written by put_number(). Throws Error if the bytes end, or if put_number() cannot have written
+/// them.
 class NumberReader {
  public:
   explicit NumberReader(std::string_view bytes) : bytes_(bytes) {}

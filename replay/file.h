@@ -17,8 +17,8 @@ constexpr size_t kMaxWrittenImageBytes = 7'500'000;
 /// Writes the page, completely or not at all. Throws Error naming the path.
 void write_replay(const std::string& path, const Replay& replay);
 
-/// Header, and the bytes of the section that it lists, as base64 of a zlib stream: the form in which live pages receive
-/// a replay (docs/reference/replay.md).
+/// A replay as live pages receive it (docs/reference/replay.md): its header, and the bytes of the sections that the
+/// header lists, as base64 of a zlib stream.
 struct ReplayText {
   nlohmann::ordered_json header;
   std::string data;

@@ -207,7 +207,7 @@ struct ReplayMetrics {
   X(km_driven)                    \
   X(reward)
 
-/// Response of a policy to a state with a road user, and to the same state without the user: values and braking
+/// Response of a policy to a state with a road user, and to the same state without it: values and braking
 /// probabilities.
 struct ReplayResponse {
   std::string policy;

@@ -37,17 +37,19 @@ class LiveServer {
   /// Address of the page, including its secret.
   const std::string& address() const;
 
-  /// Sends an event to all pages that have been greeted and keep up. Calls `message` for its data only if a page is
-  /// listening. Never waits.
+  /// Sends an event to all pages that have received the initial events and keep up. Calls `message` for its data only
+  /// if a page is listening. Never waits.
   void send(std::string_view event, const std::function<LiveJson()>& message);
-  /// Whether there are pages that have not been greeted, or that fell behind and have read everything that waited for
-  /// them.
+  /// Whether send_initial_events() is due for a page: a new one, or one that fell behind and has since read everything
+  /// that waited for it.
   bool has_ungreeted_pages() const;
-  /// Sends these events to such pages, which from now on receive the events of send().
+  /// Event for send_initial_events().
   struct Message {
     std::string_view event;
     LiveJson data;
   };
+  /// Sends these events to the pages for which has_ungreeted_pages() is true. From now on they receive the events of
+  /// send().
   void send_initial_events(const std::vector<Message>& messages);
 
   /// Returns the requests since the last call, in order.
@@ -56,7 +58,7 @@ class LiveServer {
   void wait_until(std::chrono::steady_clock::time_point end);
   /// Number of listening pages.
   int num_pages() const;
-  /// Waits until every page has read what was sent to it, or until the time is over.
+  /// Waits, for at most `patience`, until every page has read all that was sent to it.
   void flush(std::chrono::milliseconds patience);
 
  private:
