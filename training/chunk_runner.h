@@ -35,7 +35,7 @@ using LossFunction =
 
 class ChunkRunner {
  public:
-  /// The arguments must outlive it. `graphs` may be null: then nothing is captured.
+  /// The arguments must outlive the runner. If `graphs` is null, nothing is captured.
   ChunkRunner(const Policy& policy, const RolloutObservations& observations, PhaseTimer* timer = nullptr,
               Graphs* graphs = nullptr);
 

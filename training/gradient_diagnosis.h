@@ -12,8 +12,8 @@ struct GradientNorms {
   double policy = 0, value = 0, entropy = 0;
 };
 
-/// Measures the gradients of single losses, for the log alone, on the first transitions of an update. They are so few
-/// that one forward and three backward passes are at most 3 % of the update's work.
+/// Measures the gradients of single losses, for the log alone, on the first transitions of an update: so few
+/// transitions that one forward and three backward passes are at most 3 % of the update's work.
 class GradientDiagnosis {
  public:
   /// Measures on the first of these minibatches, whose advantages are set. The parameters' gradients are 0 before and

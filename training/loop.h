@@ -82,12 +82,12 @@ class OutOfMemory : public Error {
 /// Trains with the given configuration and writes into out_folder: config.toml (resolved), untrained.ckpt (the policy
 /// before its first update), checkpoint.ckpt, older checkpoints and milestones as specified by train.keep_checkpoints
 /// and train.milestone_agent_steps, policy.safetensors, policy_average.safetensors if train.weight_average is set,
-/// progress.csv, evaluation.csv if train.evaluate_every is set, and TensorBoard events.
-/// After an interrupt (common/support/interrupt.h) it saves and returns with `interrupted`. It returns with
-/// `out_of_time` if another update, as long as the longest update of this process, would not end within `minutes`.
-/// Before the first update, the longest update of an earlier process on such a device counts.
-/// Throws Error naming file and key for bad input. Throws Error naming the folder if another run is active in it, or if
-/// it holds a run and old_run is `refuse`. Throws OutOfMemory if the device's memory is too small.
+/// progress.csv, evaluation.csv if train.evaluate_every is set, and TensorBoard events. After an interrupt
+/// (common/support/interrupt.h) it saves and returns with `interrupted`. It returns with `out_of_time` if another
+/// update, as long as the longest update of this process, would not end within `minutes`. Before the first update, the
+/// longest update of an earlier process on a device of the same product, with as many agents, counts instead. Throws
+/// Error naming file and key for bad input. Throws Error naming the folder if another run is active in it, or if it
+/// holds a run and old_run is `refuse`. Throws OutOfMemory if the device's memory is too small.
 ///
 /// Several processes train one policy if each calls this function with its `launch` and equal settings. Rank 0 alone
 /// reads and writes files. An interrupt of one process ends all processes after the same update. If a rank fails, ends

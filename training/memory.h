@@ -44,8 +44,8 @@ struct MapMemory {
 /// estimate is rarely too small. Throws as map_file_bytes() does.
 MapMemory estimated_map_memory(const std::vector<std::string>& names);
 
-/// Throws Error if a run's maps do not fit, naming how many would fit. They must fit beside the agents and the network
-/// in `memory_bytes` of the device and, if the device is not the host, also in `host_memory_bytes`.
+/// Throws Error if a run's maps do not fit, naming how many would fit. Maps, agents and network together must fit in
+/// `memory_bytes` of the device. If the device is not the host, the maps must also fit in `host_memory_bytes`.
 void check_map_memory(const Config& config, Device device, int64_t memory_bytes, int64_t host_memory_bytes,
                       int num_ranks = 1);
 

@@ -63,7 +63,8 @@ class Muon {
   const double weight_decay_;
   at::Tensor momentum_;  // [elements of all weights]
   std::vector<Batch> batches_;
-  // Index of each batch element in such a vector (for padding, the vector's size), and the inverse mapping.
+  // Index of each batch element in a vector of all weights' elements (for padding, the vector's size), and the inverse
+  // mapping.
   at::Tensor element_of_place_, place_of_element_;
   std::vector<at::Tensor> scales_;  // factor of the step by weight, [weights, 1, 1] of each batch
   at::Tensor rate_, failed_;        // f32 scalars of this step

@@ -21,7 +21,7 @@ class GraphMemory {
 
   /// Calls `work`, whose tensors on the stream are allocated in this memory.
   void allocate_within(Stream stream, const std::function<void()>& work);
-  /// Releases torch's cached memory outside of it, which torch cannot do during capture.
+  /// Releases torch's other cached memory; torch cannot do so during capture.
   void release_cached_memory() const;
   /// Releases the memory once it holds no tensor. Graphs captured before must not be launched any more.
   void release();

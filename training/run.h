@@ -80,8 +80,9 @@ struct Run {
   int64_t update = 0;       // completed updates
   int64_t agent_steps = 0;  // agent-steps of the completed updates
   double distance_m = 0;    // distance driven by all agents in the completed updates
-  // Longest wall times by device and agents, as "NVIDIA H100 80GB HBM3, 20480 agents": of an update of the last process
-  // that completed one there; and, with the suffix ", evaluation", of an evaluation within the run.
+  // Longest wall times by device and number of agents, such as "NVIDIA H100 80GB HBM3, 20480 agents": of the updates of
+  // the last process that completed an update on that device; and, with the suffix ", evaluation", of the evaluations
+  // within the run.
   std::map<std::string, double> longest_update_s;
 
  private:

@@ -1,5 +1,5 @@
-// Time of a run: durations of its updates and evaluations on this machine, and whether another one ends within the
-// run's time limit.
+// Time of a run: durations of its updates and evaluations on this machine, and whether another update or evaluation
+// would end within the run's time limit.
 #pragma once
 
 #include <string>
@@ -14,9 +14,9 @@ enum class RunWork { update, evaluation };
 
 class RunTime {
  public:
-  /// Limits the run to `minutes` of wall time since `start`; 0: no limit. Durations are stored with the run, which must
-  /// outlive this object (Run::longest_update_s). So they are known from the first update on if the run used such a
-  /// machine before.
+  /// Limits the run to `minutes` of wall time since `start`; 0: no limit. Durations are stored in the run
+  /// (Run::longest_update_s), which must outlive this object, keyed by device and number of agents. They are known from
+  /// the first update if the run used the same device and number of agents before.
   RunTime(double minutes, const Stopwatch& start, Run* run);
 
   /// Whether another piece of the work, as long as the longest so far, would exceed the limit on any rank. Collective:

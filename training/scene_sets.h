@@ -15,9 +15,9 @@
 namespace pictura {
 
 /// Compiles a scene for worlds of num_agents agents. Roles, starts and goals are those of evaluations
-/// (evaluation/scene_plan.h), see with_tracks(). More road users than agents follow their records, and more replayed
-/// tracks than config.parked_cars are left out, those farthest from driven ones. `config` is that of the worlds.
-/// Returns null where the protocol lets no road user be driven. Throws Error for scenes that cannot be read or
+/// (evaluation/scene_plan.h), see with_tracks(). Road users beyond num_agents follow their records. Replayed tracks
+/// beyond config.parked_cars are left out, those farthest from driven tracks first. `config` is the configuration of
+/// the worlds. Returns null if the protocol lets no road user be driven. Throws Error for scenes that cannot be read or
 /// simulated.
 std::shared_ptr<const CompiledMap> compile_training_scene(const SceneRef& scene, const SceneProtocol& protocol,
                                                           SimulatorConfig config, int num_agents);
@@ -30,13 +30,13 @@ struct SceneSet {
 };
 
 /// Sets of scenes that the worlds of a run show in turn. World w of set k shows scene k W + w, where W is the number of
-/// worlds over all ranks and scenes are counted again and again from the first. Scenes that cannot be used are replaced
-/// by the next one that can. The host holds two sets: the current one, and the next, which is prepared in the
+/// worlds over all ranks; after the last scene, the count continues with the first. A scene that cannot be used is
+/// replaced by the next usable scene. The host holds two sets: the current one, and the next, which is prepared in the
 /// background.
 class SceneSets {
  public:
   /// Finds the scenes of simulator.maps. `worlds` are those of this rank, whose maps are ignored; `world` is their
-  /// configuration. Throws Error where there is no scene.
+  /// configuration. Throws Error if there is no scene.
   SceneSets(const Config& config, const SimulatorConfig& world, std::vector<WorldSpec> worlds, int num_all_worlds);
   ~SceneSets();
   SceneSets(const SceneSets&) = delete;
@@ -44,8 +44,8 @@ class SceneSets {
 
   /// Number of the set that worlds show after this number of updates.
   int64_t set_after(int64_t updates) const { return updates / updates_per_set_; }
-  /// Returns a set, waiting until it is prepared, and begins to prepare the next one. Throws Error where no scene can
-  /// be used.
+  /// Returns a set, waiting until it is prepared, and begins to prepare the next one. Throws Error if no scene can be
+  /// used.
   SceneSet take(int64_t number);
   /// Messages about scenes that are left out, since the last call.
   std::vector<std::string> take_notices();

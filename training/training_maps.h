@@ -13,7 +13,8 @@ namespace pictura {
 /// recorded scenes have simulator.max_agents agents each; SceneSets has their maps.
 std::vector<WorldSpec> draw_training_worlds(const Config& config);
 
-/// Configuration of the worlds of draw_training_worlds(): simulator_config(), and for recorded scenes their protocol's.
+/// Configuration of the worlds of draw_training_worlds(): simulator_config(), with the protocol's settings for recorded
+/// scenes.
 SimulatorConfig training_world(const Config& config, Device device);
 
 /// Names of the maps of draw_training_worlds(), as load_maps() takes them: simulator.maps, then their copies

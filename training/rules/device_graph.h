@@ -5,7 +5,7 @@
 
 namespace pictura {
 
-/// CUDA graph of the work that calls enqueued on a stream, with their addresses and arguments at capture.
+/// CUDA graph of captured calls on a stream, with the addresses and arguments that they had at capture.
 class DeviceGraph {
  public:
   DeviceGraph() = default;
