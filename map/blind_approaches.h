@@ -23,7 +23,7 @@ struct BlindApproaches {
 /// skipped. The map must be validated.
 BlindApproaches count_blind_approaches(const RoadMap& map, Span<const WallFace> walls, float distance_m = 20.0f);
 
-/// A lane into a junction, and a lane whose traffic walls hide from it: the lanes of a hidden pair.
+/// A hidden pair: a lane into a junction, and a lane whose traffic is hidden from it by walls.
 struct BlindCrossing {
   int32_t approach = -1, other_approach = -1;
 };

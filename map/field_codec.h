@@ -15,7 +15,7 @@
 
 namespace pictura {
 
-/// Byte-order mark in the header of every such file: its bytes identify the byte order of the numbers in the file.
+/// Byte-order mark in the header of every cached file: its bytes identify the byte order of the numbers in the file.
 constexpr uint32_t kByteOrder = 0x01020304;
 
 template <typename T>

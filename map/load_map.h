@@ -34,8 +34,8 @@ struct MapText {
 /// Loads several maps on num_threads host threads (0: all). Throws as load_map() does.
 std::vector<std::shared_ptr<const RoadMap>> load_maps(const std::vector<std::string>& names, int num_threads = 0);
 
-/// The text that load_map() would import for this name. Throws as load_map() does, and UsageError for copies, which
-/// have none, and for Lanelet2 files, which are not OpenDRIVE.
+/// Returns the text that load_map() would import for this name. Throws as load_map() does, and UsageError for copies,
+/// which have no text, and for Lanelet2 files, which are not OpenDRIVE.
 MapText map_text(const std::string& name);
 
 /// Returns the size of a map's file, from which memory is estimated. For a procedural town, it is about the size of a

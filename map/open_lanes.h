@@ -25,8 +25,8 @@ struct LaneOpening {
 
 /// Ends of a map's driving and ramp lanes.
 struct OpenLanes {
-  // [lanes] Longest way of a route beyond the end of the lane, or of a lane beside it. 0: routes end with the lane.
-  // Infinite on endless lanes, and on lanes of other types.
+  // [lanes] Length of the longest route that continues after the end of the lane, or after the end of a lane beside it.
+  // 0: routes end with the lane. Infinite for endless lanes, and for lanes of other types.
   std::vector<float> way_after_m;
   std::vector<LaneOpening> exits;    // exits of lanes where routes end, except at missing links
   std::vector<LaneOpening> entries;  // entries of open lanes; these and the lanes beside them have no predecessors

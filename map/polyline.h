@@ -64,7 +64,7 @@ inline double chord_error(const CurvePoint& a, const CurvePoint& b, const CurveP
 /// farther apart.
 std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, double tolerance_m, double max_piece_m);
 
-/// Limit on the number of samples, so that no input can exhaust memory; also ends sampling where `work` is interrupted.
+/// Limit on the number of samples, so that no input can exhaust memory; also ends sampling if `work` is interrupted.
 class SampleBudget {
  public:
   /// `source` is the map's name in messages.

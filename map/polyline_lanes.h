@@ -45,14 +45,15 @@ struct LanePieces {
 using LanePredicate = bool (*)(const Lane&);
 LanePieces segments_of(const RoadMap& map, LanePredicate is_wanted);
 
-/// Where two segments cross in plan at about one height, ends included; nothing for parallel ones.
+/// Returns the point where two segments, ends included, cross in plan at about the same height; nothing for parallel
+/// segments.
 std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
 
-/// Marks the wanted lanes of different roads that cross each other elsewhere than at their ends as lanes of junctions,
-/// adds the junctions of these and of the lanes already marked, and assigns them. Lanes that cross, fork or merge
-/// belong to one junction, which has the name of the first lane's road. A bridged length is for roads that are cut into
-/// many lanes: then junction lanes that follow each other belong to one junction too, as do wanted lanes of at most
-/// this length between two junction lanes. `count_work` receives the work of loops whose length a file determines.
+/// Marks as junction lanes the wanted lanes of different roads that cross each other, except at their ends. Adds
+/// junctions, and assigns to them these lanes and all lanes that are already marked. Lanes that cross, fork or merge
+/// belong to one junction, which has the name of the first lane's road. If bridged_m > 0, for roads that are cut into
+/// many lanes, junction lanes that follow each other belong to one junction too, as do wanted lanes of at most
+/// bridged_m between two junction lanes. `count_work` receives the work of loops whose length a file determines.
 void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
                              const std::function<void(std::size_t)>& count_work, RoadMap* map);
 

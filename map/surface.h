@@ -29,7 +29,7 @@ class Surface {
   /// Quads that may cover a point within kNear_m of `p`: a superset, from the cell of `p`.
   struct Candidates {
     std::vector<int32_t> quads;
-    bool are_complete = false;  // false where the circle around `p` is in several cells
+    bool are_complete = false;  // false if the circle around `p` is in several cells
   };
 
   /// Finds the quads near `p`, so that several queries about one place share the lookup.
@@ -40,7 +40,8 @@ class Surface {
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted) const {
     return any_near(near, p, z, is_wanted, [](int32_t) { return true; });
   }
-  /// Whether `visit` returns true for any such band. It is called only for bands that cover `p`.
+  /// Whether `visit` returns true for any band that `is_wanted` accepts. `visit` is called only for bands that cover
+  /// `p`.
   template <typename IsWanted, typename Visit>
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted, Visit&& visit) const {
     if (!near.are_complete) return any_band_at(p, z, [&](int32_t band) { return is_wanted(band) && visit(band); });

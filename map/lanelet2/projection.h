@@ -40,8 +40,8 @@ struct MgrsPlace {
   GridPoint offset_m;  // offset within the square; the code's digits determine its resolution
 };
 
-/// Returns the place of a code of zone, band, square and at most ten digits. Returns nullopt if the text is no such
-/// code, or if the square does not exist.
+/// Returns the place of a code of zone, band, square and at most ten digits. Returns nullopt if the text is not a code
+/// of this form, or if the square does not exist.
 std::optional<MgrsPlace> parse_mgrs(std::string_view code);
 
 /// Returns the PROJ string of UTM coordinates minus `shift_m`.

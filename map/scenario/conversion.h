@@ -49,7 +49,7 @@ std::vector<CurvePoint> cut_into_pieces(Conversion* conversion, const std::vecto
                                         const std::string& what);
 
 /// Returns the points relative to the origin, cut into pieces and thinned; empty if there are fewer than two points.
-/// Throws Error naming `what` where a point is too far from the origin.
+/// Throws Error naming `what` if a point is too far from the origin.
 std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& points, const std::vector<double>& widths,
                                   const std::string& what);
 

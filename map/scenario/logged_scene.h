@@ -35,7 +35,7 @@ struct LoggedNeighbor {
 struct LoggedLane {
   int64_t id = 0;
   LoggedLaneType type = LoggedLaneType::undefined;
-  std::optional<LaneType> map_type;  // overrides `type` where a program states the scene
+  std::optional<LaneType> map_type;  // overrides `type` if a program states the scene
   double speed_limit_mps = 0;        // 0: unknown
   bool interpolating = false;        // connects two lanes in a junction
   LoggedPoints points;
@@ -82,7 +82,7 @@ struct LoggedPolygon {
 };
 
 struct LoggedState {
-  Eigen::Vector3d center_m{0, 0, 0};  // centre of the box; of its bottom face where LoggedScene::is_authored
+  Eigen::Vector3d center_m{0, 0, 0};  // centre of the box; of its bottom face if LoggedScene::is_authored
   double heading_rad = 0;
   double velocity_x_mps = 0, velocity_y_mps = 0;
   double length_m = 0, width_m = 0, height_m = 0;

@@ -17,7 +17,7 @@ namespace pictura {
 enum class TrackType : uint8_t { unset, vehicle, pedestrian, cyclist, other };
 const char* to_string(TrackType type);
 
-/// State of a road user at one step. All zero where the recording has no valid state.
+/// State of a road user at one step. All members are 0 if the recording has no valid state.
 struct TrackState {
   Vec3 position_m;  // centre of the box's bottom face
   float heading_rad = 0;

@@ -14,9 +14,9 @@ namespace pictura::womd {
 
 enum class WireType : uint8_t { varint = 0, fixed64 = 1, bytes = 2, fixed32 = 5 };
 
-/// The fields of a message in sequence. All members throw FieldError where the bytes are not a message: a length or a
-/// number beyond the end, a varint of more than ten bytes or 64 bits, wire types of groups (3, 4) or undefined wire
-/// types (6, 7), field number 0.
+/// The fields of a message in sequence. All members throw FieldError if the bytes are not a message: for a length or a
+/// number beyond the end, a varint of more than ten bytes or 64 bits, wire types of groups (3, 4), undefined wire types
+/// (6, 7), or field number 0.
 class WireReader {
  public:
   explicit WireReader(std::string_view message) : rest_(message) {}

@@ -15,8 +15,8 @@ namespace pictura::womd {
 
 /// Parses a record's payload; `source` is the record's name in messages ("FILE: record 3"), to which the scenario's id
 /// is added. Accepts fields in any order, and packed and unpacked repeated numbers. Throws Error "SOURCE (scenario ID):
-/// FIELD: ..." for bytes that are not such a message, and for numbers that are not finite in points of the map or in
-/// valid states. Also throws Error for more or fewer states or signals than timestamps, and for a total of more than
+/// FIELD: ..." for bytes that are not a `Scenario` message, and for points of the map or valid states with numbers that
+/// are not finite. Also throws Error for more or fewer states or signals than timestamps, and for a total of more than
 /// 4 M points and states.
 LoggedScene parse_scenario(std::string_view payload, const std::string& source);
 
