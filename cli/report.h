@@ -20,14 +20,14 @@ std::string format_duration(double seconds);
 /// Text of a count: "1.20 M", "34.5 K" or "678".
 std::string format_count(double value);
 
-/// Progress line on stderr. On a terminal it is rewritten in place and cut off at the terminal's width, elsewhere
+/// Progress line on stderr. On a terminal it is rewritten in place and cut off at the terminal's width; elsewhere it is
 /// printed every ten seconds.
 class ProgressLine {
  public:
   ~ProgressLine();
   void update(const std::string& text);
-  /// Updates the line with the remaining time, when the fraction `done` of the work has been done since the line's
-  /// creation.
+  /// Updates the text, followed by the estimated remaining time. `done` is the fraction of the work that was done since
+  /// the line was created.
   void update(const std::string& text, double done);
   /// Prints the last text, which then remains.
   void finish();
