@@ -31,8 +31,8 @@ class Context {
 std::unique_ptr<Context> make_osmesa_context();
 
 /// Makes a context without any window system: on a GPU if EGL offers one, else with Mesa's software rasterizer. Among
-/// several GPUs, it uses the one with CUDA's index cuda_device, unless that is -1. Throws Error if libEGL, such a
-/// device or its context is missing.
+/// several GPUs, it uses the one with CUDA's index cuda_device, unless that is -1. Throws Error if libEGL, the device
+/// or its context is missing.
 std::unique_ptr<Context> make_egl_context(int cuda_device = -1);
 
 /// Makes a context current for its own lifetime.

@@ -36,8 +36,8 @@ class ImageArray {
   void begin();
   /// Averages the samples of the first `images` layers into the buffer.
   void resolve(int images);
-  /// Appends the copies of consecutive images to `out`, for copy(): three planes per image, and `stride` values from
-  /// image to image.
+  /// Appends to `copies_out` the copies that move consecutive images to `out`, for copy(): three planes per image, with
+  /// `stride` values from one image to the next.
   void plan_copy(int first, int images, void* out, int64_t stride, std::vector<RowCopy>* copies_out) const;
   /// Copies images. To the host, returns when the copies are finished; to a device, enqueues the copies on the stream.
   void copy(Span<const RowCopy> copies, Stream stream);

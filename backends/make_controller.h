@@ -1,4 +1,4 @@
-// Controllers by name, for the memory of a simulator.
+// Controllers by name, for simulators on the host and on CUDA devices.
 #pragma once
 
 #include <memory>

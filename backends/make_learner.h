@@ -15,7 +15,7 @@ namespace pictura {
 std::unique_ptr<LearnerExecutor> make_learner_executor(Device device);
 std::unique_ptr<SceneHistory> make_scene_history(Device device, const SceneHistorySize& size);
 
-/// Captures the work that `work` puts on this stream, which must not be the legacy stream, as a graph. Nothing is
+/// Captures as a graph the calls that `work` enqueues on this stream, which must not be the legacy stream. Nothing is
 /// executed before the graph is launched. Throws the exceptions of `work`, and Error for the host and for work that
 /// allocates or waits.
 std::unique_ptr<DeviceGraph> capture_graph(Device device, Stream stream, const std::function<void()>& work);

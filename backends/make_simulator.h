@@ -17,7 +17,7 @@ std::vector<std::string> simulator_names();
 /// compiled with map_options(config). The maps' handles are 0, 1, ..., see Simulator::set_worlds for others. `cuda`
 /// works on config.device, or on the calling thread's current device if config.device is the host. `auto` is `cuda` if
 /// config.device is a CUDA device and such a device is found, else `cpu`; choice_out gets the choice and its reason.
-/// Throws UsageError listing the known names, or naming parts that cannot be simulated; Error where the device does not
+/// Throws UsageError listing the known names, or naming parts that cannot be simulated; Error if the device does not
 /// exist.
 std::unique_ptr<Simulator> make_simulator(const std::string& name, const SimulatorConfig& config, CompiledMaps maps,
                                           std::vector<WorldSpec> worlds, std::string* choice_out = nullptr);

@@ -159,7 +159,7 @@ struct ClippedPrimitive {
 /// Lists from each stage of face set-up to the next. Both have capacity for every visible entry.
 struct SetupLists {
   uint32_t* entries = nullptr;          // [max_entries] per image, padded to whole batches
-  ClippedPrimitive* clipped = nullptr;  // faces of four corners from the front, lights from the back
+  ClippedPrimitive* clipped = nullptr;  // filled from both ends: faces at the front, lights at the back
   int32_t max_entries = 0, max_clipped = 0;
 };
 /// Lengths of SetupLists::clipped from its front and from its back.

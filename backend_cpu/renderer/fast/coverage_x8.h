@@ -56,7 +56,7 @@ inline RowSpansX8 row_spans_x8(const PolygonEdge* edges, int count, const PixelB
   return spans;
 }
 
-/// Calls visit(lane, coverage) for each of the first num_pixels of eight pixels with a nonzero pixel_coverage().
+/// Calls visit(lane, coverage) for each pixel with a nonzero pixel_coverage() among the first num_pixels of the eight.
 #if defined(__AVX2__)
 template <typename Visit>
 inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, const int32_t* x, const int32_t* y,
