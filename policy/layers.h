@@ -26,8 +26,8 @@ at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at
 /// undefined for none; weight, bias: [channels].
 at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tensor& weight, const at::Tensor& bias);
 
-/// Whether largest_embedding() supports these members: f32 on the host, or on a CUDA device that computes in bf16, for
-/// layers of the sizes in SetSize.
+/// Whether largest_embedding() supports these members and layers. The host supports all of them. A CUDA device supports
+/// f32 members if it computes in bf16 and SetSize::supports() accepts the layers' sizes.
 bool has_fused_set_encoder(const at::Tensor& members, const RowFeatures& features, const at::Tensor& hidden_weight,
                            const at::Tensor& weight);
 /// Returns the largest value of each channel over the embeddings of a set's members: [sets, channels], 0 for an empty

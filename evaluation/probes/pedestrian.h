@@ -10,7 +10,7 @@ namespace pictura {
 class PolicySession;
 
 struct PedestrianOptions : ProbeOptions {
-  int64_t paths = 32;        // total number, equal in each scene; smaller if fewer are found
+  int64_t paths = 32;        // number in all scenes together, divided evenly; smaller if fewer are found
   float hider_range_m = 30;  // maximum distance of a vehicle that hides a path
   float min_speed_mps = 1;   // minimum speed of the ego, forwards
   // Height of the inserted pedestrian, a child. Vehicles are 1.5 m high, so cameras above that height always see part
