@@ -80,7 +80,7 @@ struct EvaluationWorlds {
   std::string maps_hash;                 // value of EvaluationSetting::maps_hash; computed by the first evaluation
 };
 
-/// Compiles the options' maps for a world of that configuration.
+/// Compiles the options' maps for worlds of the configuration `world`.
 CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world);
 
 /// Evaluates a driver. Scenario k is on map k modulo the number of maps, and draws its random numbers as world

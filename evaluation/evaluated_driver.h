@@ -25,8 +25,8 @@ struct DriverOptions : SessionOptions {
   // drives in the policy's world, or in the paper's world without a checkpoint.
   std::string controller;
   // Creates the controller if a program supplies its own; `controller` is then its name. The controller drives on the
-  // host and reads vectors. If the options define cameras (rig, or width_px and height_px), it also reads their images,
-  // drawn by the renderer that it is given, which holds the simulator's maps. Without cameras the renderer is null.
+  // host and reads vectors. If the options define cameras (rig, or width_px and height_px), the controller also reads
+  // their images, drawn by its renderer, which holds the simulator's maps. Without cameras the renderer is null.
   std::function<std::unique_ptr<Controller>(const Simulator&, Renderer*)> make_own_controller;
   bool argmax = true;
   uint64_t seed = 1;

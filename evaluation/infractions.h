@@ -34,8 +34,8 @@ const char* to_string(PartnerMotion motion);
 const char* to_string(Contact contact);
 const char* to_string(RoadShape shape);
 
-/// First infraction of one agent in an episode; it is the only one, since the agent then halts. Values are those at the
-/// start of the step.
+/// The first and only infraction of one agent in an episode, since the agent then halts. Values are those at the start
+/// of the step.
 struct Infraction {
   int agents_per_world = 0, scenario = 0;
   std::string map;
@@ -96,7 +96,7 @@ struct InfractionGroup {
 };
 /// Groups the paper's three infractions of vehicles by their circumstances, the most frequent group first. Collisions
 /// are grouped by partner, partner's motion, contact, road shape, lane changes and merges; leaving the road by the
-/// road's shape; red lights by the time for which they had been red and the position of the head.
+/// road's shape; red lights by the time since they turned red and the position of the head.
 std::vector<InfractionGroup> group_infractions(const std::vector<Infraction>& infractions);
 
 /// Writes all infractions, one row each. Throws Error naming the path.

@@ -47,7 +47,7 @@ class MixedTraffic {
   /// Returns the other drivers' entries in an evaluation's setting: a policy's hash or a controller's name, and the
   /// driver's share.
   std::vector<std::string> setting() const;
-  /// Returns the configuration of the world, extended by all arrays that one of the drivers reads, and by impaired
+  /// Returns the configuration of the world, extended by all arrays that any of the drivers reads, and by impaired
   /// agents.
   SimulatorConfig adapted(SimulatorConfig world) const;
 

@@ -36,7 +36,7 @@ std::vector<std::string> realism_version_names();
 /// Returns the version of this name. Throws UsageError listing the names.
 const RealismVersion& realism_version(const std::string& name);
 
-/// Last recorded step before the rollouts, and number of steps of a rollout.
+/// Last recorded step before the rollouts, and number of steps of each rollout.
 constexpr int32_t kRealismStart = 10, kRealismSteps = 80;
 
 using RealismLikelihoods = std::array<double, kNumRealismFeatures>;
@@ -46,7 +46,7 @@ struct SceneRealism {
   std::string scenario_id;
   int rollouts = 0, scored = 0;  // scored: number of scored road users
   // Likelihoods in (0, 1]. pooled: exp of the mean log-likelihood over all road users and steps. by_object: mean over
-  // road users of exp of the mean log-likelihood over the steps of one.
+  // road users of exp of the mean log-likelihood over the road user's steps.
   RealismLikelihoods pooled, by_object;
   double score = 0, score_by_object = 0;  // weighted means of pooled and of by_object over features that are not NaN
   double ade_m = 0, min_ade_m = 0;        // mean and minimum over rollouts of the mean over road users
@@ -72,7 +72,7 @@ class RealismScene {
 
   const Scenario& scenario() const { return *scenario_; }
   /// track_ids() returns the ids of the tracks that are present at kRealismStart; every rollout must contain all of
-  /// them. scored_ids() returns the ids of the scored ones among them.
+  /// them. scored_ids() returns the ids of the tracks that are scored.
   std::vector<int64_t> track_ids() const;
   std::vector<int64_t> scored_ids() const;
 
@@ -101,7 +101,7 @@ class RealismScene {
 };
 
 /// Returns the log-likelihoods [steps] of one road user's recorded values under the histogram of the simulated values;
-/// NaN where the recorded value is NaN. Simulated NaNs are ignored; if all simulated values are NaN, so are all
+/// NaN at steps whose recorded value is NaN. Simulated NaNs are ignored; if all simulated values are NaN, so are all
 /// results.
 std::vector<double> log_likelihoods(const RealismTerm& term, Span<const double> recorded, Span<const double> simulated);
 /// Returns the log-likelihood of a recorded event, or of its absence, if `count` of `rollouts` have the event.

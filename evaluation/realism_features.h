@@ -51,9 +51,10 @@ constexpr double kCornerRounding = 0.7;
 
 /// Returns the seconds until `follower` reaches `leader` at constant speeds. The follower follows the leader if the
 /// leader's box is ahead in the follower's frame and overlaps the follower's laterally, and if the headings differ by
-/// at most 75 degrees (10 degrees if the overlap is below 0.5 m). gap_m_out receives the distance along the follower's
-/// heading; infinity if it does not follow the leader. The result is at most kMaxTimeToCollision_s; it has this value
-/// also if the follower does not follow the leader, the gap does not close, or a speed is NaN.
+/// at most 75 degrees (10 degrees if the overlap is below 0.5 m). gap_m_out receives the gap between both boxes along
+/// the follower's heading; infinity if the follower does not follow the leader. The result is at most
+/// kMaxTimeToCollision_s; it has this value also if the follower does not follow the leader, the gap does not close, or
+/// a speed is NaN.
 double time_to_collision_s(const RealismBox& follower, double follower_mps, const RealismBox& leader, double leader_mps,
                            double* gap_m_out);
 constexpr double kMaxTimeToCollision_s = 5.0;
@@ -66,7 +67,7 @@ class RealismRoad {
   /// Returns the horizontal distance in metres from a place to the nearest road edge on the same level; positive: off
   /// the road. If no edge is within kRoadSideReach_m, returns -kRoadSideReach_m.
   double edge_distance_m(double x_m, double y_m, double z_m) const;
-  /// Returns the maximum of this distance over the four lower corners of a box.
+  /// Returns the maximum of that distance over the four lower corners of a box.
   double edge_distance_m(const RealismObject& object, const RealismPose& pose) const;
   /// Whether the middle of a box's front crosses a stop line between two poses, in the line's direction of travel,
   /// while the line's light is red at that step of the recording. If the box crosses several lines at once, the lights
@@ -79,7 +80,7 @@ class RealismRoad {
   const Scenario& scenario_;  // must outlive this object
 };
 
-/// Features of some objects of a scene: [objects][kNumRealismFeatures][steps]. NaN where a feature is undefined.
+/// Features of some objects of a scene: [objects][kNumRealismFeatures][steps]; NaN if a feature is undefined at a step.
 class RealismFeatures {
  public:
   RealismFeatures() = default;
@@ -104,8 +105,7 @@ class RealismFeatures {
 /// Number of poses before the first step with features. The speed and acceleration at that step are computed from them.
 constexpr size_t kRealismHistory = 2;
 
-/// Returns derivatives [steps] by central differences over two steps of dt_s; NaN where a neighbouring value is
-/// missing.
+/// Returns derivatives [steps] by central differences over two steps of dt_s; NaN at steps with a missing neighbour.
 std::vector<double> central_differences(Span<const double> values, double dt_s, bool are_angles = false);
 
 /// Returns the features of objects[scored[i]] for each i, among all objects. poses: [objects][kRealismHistory + steps];

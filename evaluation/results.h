@@ -121,7 +121,7 @@ struct Estimate {
   double value = 0, half_width_95 = 0;
 };
 
-/// Terms of one scenario in the two sums of a ratio: part is the dividend's, whole the divisor's.
+/// Terms of one scenario in the two sums of a ratio: `part` in the dividend, `whole` in the divisor.
 struct RatioTerm {
   double part = 0, whole = 0;
 };
@@ -164,7 +164,7 @@ struct EvaluateRow {
 std::vector<std::pair<std::string, Estimate>> metrics_of(const EvaluateRow& row);
 
 EvaluateRow row_of(const DensityResult& result, int steps);
-/// Returns one row a density, in the order of the results.
+/// Returns one row for each result, in the order of the results.
 std::vector<EvaluateRow> rows_of(const EvaluationResults& results);
 
 /// Merges parts, which must have the same setting, and whose scenarios must be contiguous and disjoint for each

@@ -38,7 +38,7 @@ void check_rollouts(const SceneProtocol& protocol);
 std::string encoded(const SceneRollouts& scene);
 
 /// Writer of a file with one message SimAgentsChallengeSubmission, which contains the type and the scenes of a
-/// submission but no authors. Concatenated files also form such a message.
+/// submission but no authors. The concatenation of several files is a message of this type too.
 class RolloutsFile {
  public:
   explicit RolloutsFile(const std::string& path);
@@ -59,8 +59,8 @@ class RolloutsFile {
 /// another program.
 class RolloutsReader {
  public:
-  /// Reads the file and lists its scenes. Throws Error naming the file and the field if the bytes are no such message,
-  /// the submission has another type, or a scenario occurs twice.
+  /// Reads the file and lists its scenes. Throws Error naming the file and the field if the bytes are not
+  /// SimAgentsChallengeSubmission messages, the submission has another type, or a scenario occurs twice.
   explicit RolloutsReader(const std::string& path);
   std::vector<std::string> scenario_ids() const;  // in alphabetical order
   bool has(const std::string& scenario_id) const { return scenes_.contains(scenario_id); }

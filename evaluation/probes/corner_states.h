@@ -13,7 +13,7 @@ namespace pictura {
 
 struct ProbeFrame;
 
-/// Lane into a junction without traffic lights, and the lanes whose traffic crosses that lane and is hidden from it by
+/// Lane into a junction without traffic lights, and the lanes whose traffic crosses its path and is hidden from it by
 /// walls (find_blind_crossings()). Junctions with lights are excluded, since a light stops one of the two streams of
 /// traffic.
 struct BlindCorner {

@@ -42,7 +42,7 @@ std::vector<bool> free_points(const CrossingPath& path, Span<const AgentBox> box
 struct PathPart {
   int begin = 0, first_seen = 0, hidden_again = 0, end = 0;
 };
-/// Returns the used part of a path. visible_shares: [kPathPoints] shares by Renderer::visibility, NaN where a
+/// Returns the used part of a path. visible_shares: [kPathPoints] shares by Renderer::visibility, NaN at points where a
 /// pedestrian cannot stand. The result is empty if a pedestrian at the origin is visible, or if the phases do not
 /// satisfy the constants above, for instance because a NaN cuts off a phase.
 std::optional<PathPart> usable_part(Span<const float> visible_shares);

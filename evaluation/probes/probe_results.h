@@ -55,7 +55,7 @@ struct ProbeResults {
 /// cases, with its 95 % interval; infinite without scenes.
 struct ResponseMeans {
   int64_t cases = 0;
-  int scenes = 0;  // number of scenes with such cases
+  int scenes = 0;  // number of scenes with cases of this kind
   Estimate abs_value_change, abs_brake_change;
   Estimate value_change, brake_change;  // signed
   Estimate changed_share;               // share of cases in which value or probability differ in at least one bit

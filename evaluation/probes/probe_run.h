@@ -59,7 +59,7 @@ struct KeptScene {
 
   /// Adds a world, followed by inserted boxes.
   void add_world(const ProbeFrame& frame, size_t world, Span<const InsertedBox> inserted = {});
-  /// Indices in this scene of boxes of the last added world: of a box of the world's frame, and of the first inserted
+  /// Indices in this scene of two boxes of the last added world: a box of the world's frame, and the first inserted
   /// box.
   int32_t box_of(const ProbeFrame& frame, size_t world, int32_t box_of_frame) const {
     return box_of_frame - frame.box_begin[world] + world_begin[geometry.size() - 1];
@@ -126,9 +126,9 @@ class ProbeRun final : public EvaluationObserver {
   /// Visibilities in a scene in the memory of device().
   std::vector<float> visibility(const SceneBatch& scene, const std::vector<View>& views,
                                 const std::vector<VisibilityQuery>& queries);
-  /// Renderer configuration of that policy's images.
+  /// Renderer configuration of these cameras' images.
   const RendererConfig& cameras() const { return cameras_; }
-  /// First camera of that configuration, in the ego's frame.
+  /// First camera of cameras(), in the ego's frame.
   const PinholeCamera& front_camera() const { return front_camera_; }
   const CompiledMaps& maps() const { return maps_; }
   Renderer& measuring() { return *measuring_; }

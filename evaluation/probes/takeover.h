@@ -37,8 +37,8 @@ struct TakeoverStart {
 struct Takeover {
   int32_t steps = 0;     // steps that the ego drove: kTakeoverSteps, or fewer if an infraction ended the run
   uint8_t ended_by = 0;  // Event bits of that infraction
-  // sight_step: first step at which no wall of the map is between the ego's eye and the user, or its place if it is
-  // removed. input_step: first step at which the user is in the policy's input, that is, seen by cameras or among the
+  // sight_step: first step at which no wall of the map is between the ego's eye and the user, or the place of a removed
+  // user. input_step: first step at which the user is in the policy's input, that is, seen by cameras or among the
   // nearest partners. -1: never.
   int32_t sight_step = -1, input_step = -1;
   float sight_distance_m = std::numeric_limits<float>::quiet_NaN();  // at sight_step, between the boxes' centres
