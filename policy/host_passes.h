@@ -53,9 +53,8 @@ void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t came
 void member_rows(const float* members, const int32_t* counts, int64_t sets, int64_t max_members, const RowSize& size,
                  float* out);
 
-/// Finds the largest value of each channel among the members of each set, and the index in the set of the member with
-/// that value (the first of equal ones). In an empty set the value is 0 and the index -1. members: [sum of counts,
-/// channels], set after set.
+/// Finds the largest value of each channel among the members of each set, and the index in the set of the first member
+/// with that value. In an empty set the value is 0 and the index -1. members: [sum of counts, channels], set after set.
 void largest_members(const float* members, const int32_t* counts, int64_t sets, int64_t channels, float* largest_out,
                      int32_t* which_out);
 

@@ -17,7 +17,7 @@ struct NamedTensor;
 class ImageBackbone {
  public:
   /// Reads a program, with its weights in the type and on the device of `options`. Frozen weights get no gradients.
-  /// Throws Error naming the file if it does not exist or is not such a program.
+  /// Throws Error naming the file if it does not exist or is not a program of scripts/export_backbone.
   ImageBackbone(const std::string& path, const at::TensorOptions& options, bool frozen);
   ~ImageBackbone();
 
@@ -32,8 +32,8 @@ class ImageBackbone {
   void check_images(const Rig& rig) const;
 
   /// Computes feature maps, [cameras * views, channels, rows, columns] with channels last in memory, of images, u8
-  /// [views, cameras, 3, height, width]. Each patch of an image has one position of the map. Images whose size is no
-  /// multiple of the patch size are padded with black at the right and the bottom.
+  /// [views, cameras, 3, height, width]. Each position of the map belongs to one patch of the image. Images whose size
+  /// is no multiple of the patch size are padded with black at the right and the bottom.
   at::Tensor forward(const at::Tensor& images) const;
 
  private:

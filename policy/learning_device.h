@@ -13,8 +13,8 @@ namespace pictura {
 
 /// Returns the device on which this configuration learns, in the process with this local rank. If the configuration
 /// does not specify one of several devices, the rank selects it. Opens torch's CUDA library for a CUDA device. Throws
-/// Error naming the key and the reason if the configuration cannot learn there, or if the simulator or the renderer
-/// uses other memory.
+/// Error naming the key and the reason if the configuration cannot learn on this device, or if the simulator or the
+/// renderer uses other memory.
 Device open_learning_device(const Config& config, int local_rank = 0);
 
 /// Torch's current stream of a device, on which the network computes; null on the host. Autograd enqueues the backward

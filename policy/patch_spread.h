@@ -21,14 +21,14 @@ StoredTensor spread_over_patches(const StoredTensor& weight, int factor);
 
 /// Returns the weight, or Adam's moments of a weight, repeated without division at each position of
 /// spread_over_patches(). Spread weights inherit the Adam moments of their source weight. A feature is a sum of w x
-/// over pixels; where a block is constant, each of its k^2 weights has the gradient dL/dw of the source weight. So its
-/// moments, and its direction m / sqrt(v), equal those of the source weight. Together the k^2 weights move the feature
-/// k^2 times as far: see rate_factor_of_spread().
+/// over pixels; if a block is constant, each of its k^2 weights has the gradient dL/dw of the source weight. So the
+/// moments of each weight, and its direction m / sqrt(v), equal those of the source weight. Together the k^2 weights
+/// move the feature k^2 times as far: see rate_factor_of_spread().
 StoredTensor repeat_over_patches(const StoredTensor& weight, int factor);
 
 /// Learning-rate factor of spread weights: 1 / k^2, with which a step moves the features as far as before the spread.
-/// Weight decay keeps the full rate, since it scales the sum as it scales each weight. In the gradient norm the k^2
-/// equal gradients count as one, so that clipping is unchanged.
+/// Weight decay keeps the full rate, since it scales the sum of the spread weights by the same factor as each weight.
+/// In the gradient norm the k^2 equal gradients count as one, so that clipping is unchanged.
 constexpr double rate_factor_of_spread(int factor) { return 1.0 / (double(factor) * factor); }
 
 }  // namespace pictura

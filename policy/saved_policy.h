@@ -14,7 +14,7 @@ struct SavedPolicy : PolicyFacts {
 std::vector<NamedTensor> to_tensors(const std::vector<StoredTensor>& stored);
 std::vector<StoredTensor> to_stored(const std::vector<NamedTensor>& tensors);
 
-/// As read_stored_policy(), parse_stored_policy() and write_stored_policy().
+/// Variants of read_stored_policy(), parse_stored_policy() and write_stored_policy() for a SavedPolicy.
 SavedPolicy read_policy(const std::string& path, bool average = false);
 SavedPolicy parse_policy(const std::string& file, const std::string& path, bool average = false);
 void write_policy(const std::string& path, const SavedPolicy& policy, WeightType type, const std::string& commit);

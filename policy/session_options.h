@@ -28,7 +28,7 @@ struct SessionOptions {
   bool average = false;        // uses the average of weights that a checkpoint may hold
   double camera_severity = 0;  // factor of kFullCameraSeverity by which cameras are randomized
   int decision_steps = 0;      // steps for which an action is held; 0: as in training (policy.decision_steps)
-  // Lights of the policy's worlds; without a value as in training.
+  // Lights of the policy's worlds; the lights of training if there is no value.
   std::optional<LightCycles> light_cycles;
   std::optional<LightHeads> light_heads;
 };

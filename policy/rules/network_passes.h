@@ -1,5 +1,5 @@
 // Operations of a network on CUDA devices between matrix products, each in one pass over memory where ATen takes
-// several. policy/host_passes.h has those of the host.
+// several. policy/host_passes.h has the host's operations.
 #pragma once
 
 #include <algorithm>
@@ -124,7 +124,8 @@ class NetworkPasses {
   NetworkPasses(const NetworkPasses&) = delete;
   NetworkPasses& operator=(const NetworkPasses&) = delete;
 
-  /// Whether bias_gelu(), and norm() and bias_norm_gelu(), support rows of this number of channels.
+  /// Whether bias_gelu() supports rows of this number of channels (supports_gelu()), or norm() and bias_norm_gelu() do
+  /// (supports_norm()).
   static constexpr bool supports_gelu(int64_t channels) { return channels % 8 == 0 && channels <= 1024; }
   static constexpr bool supports_norm(int64_t channels) {
     return channels % 64 == 0 && channels <= 512 && channels != 320 && channels != 448;
