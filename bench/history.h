@@ -30,9 +30,9 @@ struct HistoryMeasurement {
 };
 
 /// Measures both kinds of calls. A call of the current scene draws num_views random agents of the last step. A call of
-/// the history gathers and draws as many random pairs of step and agent. Absent agents are excluded from both. Throws
-/// Error where an image from the history differs in any value from the image drawn at the time of the step, or a
-/// backend cannot run here.
+/// the history gathers and draws as many random pairs of step and agent. Neither call draws absent agents. Throws Error
+/// if an image from the history differs in any value from the image drawn at the time of the step, or if a backend
+/// cannot run on this machine.
 HistoryMeasurement measure_history(const HistoryCase& history_case);
 
 }  // namespace pictura

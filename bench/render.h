@@ -19,7 +19,7 @@ struct RenderCase {
   PixelFormat format = PixelFormat::u8;
   Planes planes = Planes::none;
   ChannelOrder order = ChannelOrder::planar;
-  int patch_px = kDefaultPatch_px;  // side of the patches, where the order is patches
+  int patch_px = kDefaultPatch_px;  // side of the patches, if the order is patches
   int checked_views = 8;            // compared with the oracle, before and after timing; 0: none
   int repeats = 7;                  // 0: no timing
   double repeat_s = 1.0;            // approximate duration of a repeat

@@ -20,8 +20,8 @@ std::string name_of_function(const py::function& function);
 
 /// Makes controllers that call function(observations), NumPy's arrays [slots, ...] by name, for actions int [slots].
 /// With a renderer, observations have images as well: `rgb` u8 [slots, cameras, 3, height, width], black for inactive
-/// agents; `rgb_0`, `rgb_1`, ... where the cameras have several sizes. The controllers throw Error if the simulator or
-/// the renderer is not on the host, UsageError if the function returns anything else, and exceptions that the function
+/// agents; `rgb_0`, `rgb_1`, ... if the cameras have several sizes. The controllers throw Error if the simulator or the
+/// renderer is not on the host, UsageError if the function returns anything else, and exceptions that the function
 /// raises.
 std::function<std::unique_ptr<Controller>(const Simulator&, Renderer*)> function_controllers(
     const py::function& function);

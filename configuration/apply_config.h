@@ -18,8 +18,8 @@ int whole_factor(ImageSize from, ImageSize to);
 /// Returns the rig of the render section for a run after `agent_steps`.
 Rig rig_of(const Config& config, int64_t agent_steps = 0);
 
-/// Returns the settings of the renderer: all image settings that the policy depends on, with a rig of its run. `device`
-/// is the network's device.
+/// Returns the settings of the renderer: all image settings that the policy depends on, and `rig`, a rig of the
+/// configuration's run. `device` is the network's device.
 RendererConfig renderer_config(const Config& config, const Rig& rig, Device device = {});
 
 /// Returns the settings of the simulator for training, with entity sets only for the vector modality.

@@ -32,7 +32,7 @@ struct Config {
 
 /// Reads a TOML text. `overrides` are "section.key=value" and take precedence; "section.key=" removes the text's value,
 /// and "render.rig=..." also removes the text's image sizes. Whole numbers may be written in any decimal notation.
-/// run.backend, the old name of simulator.backend and render.backend, sets whichever of the two is absent. Throws Error
+/// run.backend, the old name of simulator.backend and render.backend, sets each of the two that is absent. Throws Error
 /// naming source:line and key for unknown keys, wrong types, values out of range, contradictions, and backends that
 /// this build does not know, whose names it lists.
 Config parse_config(const std::string& text, const std::string& source, const std::vector<std::string>& overrides = {});

@@ -44,9 +44,9 @@ struct TrainSection {
   double max_grad_norm = 0.5;
   double weight_average = 0;        // half-life of the average in updates, see training/weight_average.h; 0: none
   int64_t sharpen_agent_steps = 0;  // interval in which logits double, see training/schedule.h; 0: never
-  /// Saved vector policy to imitate, see training/teacher.h. The loss includes the KL divergence from its actions times
-  /// teacher_coef, which falls linearly to 0 over teacher_agent_steps. The path is relative to the configuration's
-  /// folder.
+  /// Saved vector policy to imitate, see training/teacher.h. The loss includes the KL divergence from the teacher's
+  /// actions times a weight, which falls linearly from teacher_coef to 0 over teacher_agent_steps. The path is relative
+  /// to the configuration's folder.
   std::string teacher;
   double teacher_coef = 1;
   int64_t teacher_agent_steps = 100'000'000;

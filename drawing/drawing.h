@@ -37,10 +37,10 @@ void draw_map_png(const RoadMap& map, const std::string& path, const MapPictureO
 /// Writes draw_map() as vector graphics; size_px is the nominal size.
 void draw_map_svg(const RoadMap& map, const std::string& path, const MapPictureOptions& options = {});
 
-/// Returns the pages of a contact sheet, each with rows for about 8,192 px. A row shows one view (several rows where
-/// the rig is too wide) and a column one camera, with labels of camera and view names. Images are enlarged by one
-/// integer factor without smoothing (0: chosen so that a row is about 1600 px wide), and must be u8 images of the rig.
-/// Throws Interrupted at ^C.
+/// Returns the pages of a contact sheet, each with rows for about 8,192 px. A row shows one view (several rows if the
+/// rig is too wide) and a column one camera, with labels of camera and view names. Images are enlarged by one integer
+/// factor without smoothing (0: chosen so that a row is about 1600 px wide), and must be u8 images of the rig. Throws
+/// Interrupted at ^C.
 std::vector<RgbImage> contact_sheets(const HostImages& images, const Rig& rig,
                                      const std::vector<std::string>& view_names, int enlargement = 0);
 

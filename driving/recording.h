@@ -32,7 +32,7 @@ struct RecordedDriver {
   Renderer* renderer = nullptr;  // renderer of the session's images
 };
 
-/// Returns the renderer configuration of the policy's images; that of the paper's cameras for a controller.
+/// Returns the renderer configuration of the policy's images, or of the paper's cameras for a controller.
 RendererConfig cameras_of(const RecordedDriver& driver);
 /// Returns the policy's response to an agent's present observation in the only world; empty if no policy drives or the
 /// agent is not active.

@@ -27,7 +27,7 @@ struct RecordedScenario {
   std::string world_of;  // policy whose world configuration is used, as in probes; empty: the driver's own
 };
 
-/// Policy that takes over `agent` after `step` steps of a scenario, for `steps` steps, while all other agents repeat
+/// A policy's takeover of `agent` after `step` steps of a scenario, for `steps` steps, while all other agents repeat
 /// their motion. The takeover happens in the world configuration of RecordedScenario::world_of.
 struct RecordedTakeover {
   std::string policy;

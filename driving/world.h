@@ -22,7 +22,8 @@ struct WorldOptions : SessionOptions {
   uint64_t seed = 0;
   bool walls = true;
   bool vector_observations = true;
-  // Populations. Without a value they are those of the policy's training, or those of the paper for a controller.
+  // Shares of pedestrians and cyclists. Without values, the shares of the policy's training, or the paper's for a
+  // controller.
   std::optional<float> pedestrian_fraction, cyclist_fraction;
   std::optional<int> parked_cars;
   OtherShares others{};

@@ -50,7 +50,7 @@ struct WarpState {
   uint8_t owners[kWarpSize];
 };
 
-/// Shared state of a block. Always in shared memory, even where the rest of the block's memory is global.
+/// Shared state of a block. Always in shared memory, even if the rest of the block's memory is global.
 struct BlockState {
   PreparedImage current;   // image that is being drawn
   PreparedImage upcoming;  // next image

@@ -38,8 +38,8 @@ struct PixelWord {
   }
 };
 
-// Returns the fully covering face of the pixel with the largest occluder bound. kNone if there is no such face, or if
-// it is in the pixel's fragment list.
+// Returns the fully covering face of the pixel with the largest occluder bound. kNone if there is no fully covering
+// face, or if it is in the pixel's fragment list.
 template <typename Memory>
 __device__ typename Memory::Word full_of_word(typename Memory::Word word) {
   return ((word & PixelWord<typename Memory::Word>::kFace) - 1) & Memory::kNone;

@@ -16,7 +16,7 @@ struct ImageWriter {
   void* images;
   int64_t first, plane;  // in elements: the image's offset, and the stride of planes
   int width_px, height_px;
-  int patch_px;  // side of the patches, where the order is patches
+  int patch_px;  // side of the patches, if the order is patches
 
   /// Stores the colour of a pixel with a fragment list in the first of its fragments.
   template <typename Memory>
@@ -63,8 +63,8 @@ struct ImageWriter {
     }
   }
 
-  // Calls change(effect, i) for each pixel, where the image has an effect; values beyond the image stay black. The
-  // effect is in shared memory, because no registers are left.
+  // Calls change(effect, i) for each pixel if the image has an effect; values beyond the image stay black. The effect
+  // is in shared memory, because no registers are left.
   template <typename Change>
   __device__ void for_each_pixel_with_effect(const Place& place, Change&& change) const {
     if constexpr (kRandomizesCameras) {

@@ -20,7 +20,7 @@ struct KernelSet {
 
 /// Returns the kernels that were compiled with this program, for any rig.
 KernelSet ahead_of_time_kernels();
-/// Loads the kernels and sets their attributes. Must be called once before the first launch. Fails where the kernels do
+/// Loads the kernels and sets their attributes. Must be called once before the first launch. Fails if the kernels do
 /// not run on the device.
 cudaError_t prepare_kernels(KernelSet* kernels);
 

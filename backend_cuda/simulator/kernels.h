@@ -15,7 +15,7 @@ struct StepStreams {
   cudaEvent_t forked = nullptr, joined = nullptr;
 };
 
-/// Launches the phases of a reset, in the worlds of `mask` [worlds], or in all worlds where it is null.
+/// Launches the phases of a reset, in the worlds of `mask` [worlds], or in all worlds if the mask is null.
 void launch_reset(const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed, const StepStreams& streams);
 void launch_edit(const PhaseArrays& arrays, const StateEdit& edit, const StepStreams& streams);
 void launch_queries(const PhaseArrays& arrays, const ObservationQueries& asked, const StepStreams& streams);

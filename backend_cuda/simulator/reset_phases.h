@@ -140,7 +140,7 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
   });
 }
 
-/// Phase that begins episode 0 of `seed` in the worlds of the mask [worlds], or in all worlds where it is null.
+/// Phase that begins episode 0 of `seed` in the worlds of the mask [worlds], or in all worlds if the mask is null.
 struct BeginFirstEpisode {
   PhaseArrays arrays;
   const uint8_t* mask;
@@ -234,7 +234,7 @@ struct PrepareEpisode {
   }
 };
 
-/// Launches episode 0 of `seed` in the worlds of the mask, or in all worlds where it is null.
+/// Launches episode 0 of `seed` in the worlds of the mask, or in all worlds if the mask is null.
 template <typename Launch>
 void launch_reset(const Launch& launch, const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed) {
   launch.teams(arrays.num_worlds, BeginFirstEpisode{arrays, mask, seed});

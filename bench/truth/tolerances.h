@@ -56,7 +56,7 @@ struct ImageTolerance {
 /// Tolerance of the oracle against its own images: its arithmetic is the same on every machine
 /// (docs/developer/house.md).
 constexpr ImageTolerance kGoldenOracle{"oracle", 0, 0, 0, 0};
-/// Tolerance of the CUDA renderer against the oracle's images: the design's promise, as above.
+/// Tolerance of the CUDA renderer against the oracle's images: the agreement that the design promises.
 constexpr ImageTolerance kGoldenKernel{"kernel", kKernelWorstError, kKernelError, 1 - kKernelShareWithin, 0};
 /// Tolerance of the oracle against the truth, in floats: the promised PSNR in every scene, without averaging over a
 /// town. The worst value is 12/255.
