@@ -44,7 +44,7 @@ class Egl {
   decltype(&eglMakeCurrent) make_current = function<decltype(make_current)>("eglMakeCurrent");
   decltype(&eglQueryAPI) query_api = function<decltype(query_api)>("eglQueryAPI");
   decltype(&eglQueryString) query_string = function<decltype(query_string)>("eglQueryString");
-  // Extensions; null where they are missing.
+  // Extensions; null if they are missing.
   PFNEGLQUERYDEVICESEXTPROC query_devices = extension<decltype(query_devices)>("eglQueryDevicesEXT");
   PFNEGLQUERYDEVICESTRINGEXTPROC query_device_string =
       extension<decltype(query_device_string)>("eglQueryDeviceStringEXT");

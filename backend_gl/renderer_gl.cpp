@@ -197,7 +197,7 @@ class GlRenderer final : public Renderer {
     for (int64_t image = begin; image < end;) {
       const std::size_t index = group.cameras[image / num_views];
       const int64_t view = image % num_views;
-      // Views of one camera are drawn together where they have the same projection.
+      // Views of one camera are drawn together if they have the same projection.
       const int64_t last = config_.randomization.moves_cameras() ? image + 1 : std::min(end, image + num_views - view);
       const auto layer = static_cast<std::size_t>(image - begin), end_layer = static_cast<std::size_t>(last - begin);
       project_by(camera_of(index, views[view]));

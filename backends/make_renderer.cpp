@@ -14,7 +14,7 @@ std::unique_ptr<Renderer> make_cpu_renderer(const RendererConfig& config);
 /// *origin_out gets the origin of the kernels.
 std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config, std::string* origin_out);
 std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config, std::string* origin_out);
-/// Empty where a CUDA device is usable, else the reason why not.
+/// Empty if a CUDA device is usable, else the reason why none is.
 std::string cuda_unavailable();
 #endif
 

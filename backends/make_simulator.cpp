@@ -9,7 +9,7 @@ namespace pictura {
 std::unique_ptr<Simulator> make_cpu_simulator(SimulatorSetup setup);
 #ifdef PICTURA_HAS_CUDA
 std::unique_ptr<Simulator> make_cuda_simulator(SimulatorSetup setup);
-/// Empty where a CUDA device is usable, else the reason why not.
+/// Empty if a CUDA device is usable, else the reason why none is.
 std::string cuda_unavailable();
 #endif
 

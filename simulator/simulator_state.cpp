@@ -38,7 +38,7 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
     add_values(&hash, values...);
     prints.push_back({std::move(name), hash.value()});
   };
-  // Rules with a usual choice count only where the choice differs: states with the usual rules, including states of
+  // Rules with a usual choice count only if the choice differs: states with the usual rules, including states of
   // earlier versions, carry no mark.
   const auto add_unusual = [&prints](bool is_unusual, const auto& value) {
     if (!is_unusual) return;

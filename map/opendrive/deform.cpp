@@ -81,7 +81,8 @@ class ShiftSolver {
         }
       }
     }
-    // The remaining groups have only ends of roads within junctions. The first end of such a group is not shifted.
+    // The remaining groups have only ends of roads within junctions. The first end of each of these groups is not
+    // shifted.
     for (std::size_t end = 0; end < ends_.size(); ++end) take_members(end);
     std::vector<Eigen::Vector2d> all;
     for (std::size_t end = 0; end < ends_.size(); ++end) {

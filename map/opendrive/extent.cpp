@@ -9,7 +9,7 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Tolerance of negative widths, which count as 0. Where a lane tapers off, rounding by writers makes widths slightly
+// Tolerance of negative widths, which count as 0. If a lane tapers off, rounding by writers makes widths slightly
 // negative.
 constexpr double kWidthTolerance_m = 0.01;
 constexpr double kMaxWidth_m = 500;

@@ -142,7 +142,7 @@ double join_stations(const Geometry& geometry, GeometryPiece* before, GeometryPi
   return -error;
 }
 
-/// Returns the jump where a geometry does not begin at the end of the previous one.
+/// Returns the jump if a geometry does not begin at the end of the previous one.
 std::optional<Jump> jump_between(const Geometry& geometry, std::size_t index, const FileRoad& road) {
   const GeometryPiece& before = road.geometry[index - 1];
   const double gap_m = distance_m(before, road.geometry[index]);

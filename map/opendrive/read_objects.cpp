@@ -25,7 +25,7 @@ bool contains_word(std::string text, std::string_view word) {
 }
 
 /// Returns the kind of an object if RoadMap stores it, else nullopt. OpenDRIVE has no object type for stop lines; files
-/// contain them as road marks of the subtype signalLines, or as objects with such a name.
+/// contain them as road marks of the subtype signalLines, or as objects called stop line.
 std::optional<FileObject::Kind> kind_of(const Element& element) {
   const std::string type = element.text("type", "none");
   if (type == "crosswalk") return FileObject::Kind::crosswalk;

@@ -134,7 +134,7 @@ class Layout {
     kHills = 200,
   };
 
-  // In execution order.
+  // Stages, in the order of execution.
   void place_nodes();
   void plan_streets();
   void choose_avenues();

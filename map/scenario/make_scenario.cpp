@@ -71,7 +71,7 @@ std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& po
   if (line.size() < 2) return {};
   if (scene.tolerance_m > 0) {
     std::vector<CurvePoint> thinned;
-    // Thinning tests each point against the others of its piece; a straight piece has some twenty.
+    // Thinning tests each point against the other points of its piece; a straight piece has about twenty points.
     conversion->count_work(line.size() * 20);
     for (const std::size_t index : thin_polyline(line, scene.tolerance_m, kMaxPiece_m)) thinned.push_back(line[index]);
     line = std::move(thinned);

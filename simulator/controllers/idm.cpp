@@ -194,7 +194,7 @@ void IdmController::act(const SimulatorArrays& input, Span<const uint8_t> mask, 
   }
 }
 
-/// Returns the agent's place on its path. A path along lanes is rebuilt where the agent was moved or the path runs out.
+/// Returns the agent's place on its path. A path along lanes is rebuilt if the agent was moved or the path runs out.
 float IdmController::place_on_path(const SimulatorArrays& input, size_t slot) {
   constexpr float kOffPath_m = 1, kLeast_m = 60;
   const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);

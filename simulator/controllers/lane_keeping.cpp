@@ -131,7 +131,8 @@ void LaneKeepingAgent::plan() {
   path_.limit_speeds(goals_.back(), may_turn ? kTurning_mps : INFINITY);
 }
 
-/// Plans the straightest way on where a turn cannot be taken, if that way is clear, and then to the waypoints.
+/// Replaces a turn that cannot be taken: if the straightest way is clear, it becomes the path, and its plan is
+/// returned; else `plan` is returned. The path to the waypoints continues from there.
 DrivingPlan LaneKeepingAgent::plan_elsewhere(DrivingPlan plan) {
   constexpr float kPassed_m = 20;
   LanePath other = path_;

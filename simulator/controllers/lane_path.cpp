@@ -77,7 +77,7 @@ std::optional<std::vector<int32_t>> LanePath::route_to(RoutePoint to) const {
   return lanes;
 }
 
-/// Follows a route. Returns false, and stops there, where the length is too short for an optional lane change.
+/// Follows a route. Stops and returns false at an optional lane change for which the length is too short.
 bool LanePath::follow_route(const std::vector<int32_t>& lanes, RoutePoint to) {
   constexpr float kMinChange_m = 12;  // per change
   for (size_t i = 1; i < lanes.size(); ++i) {

@@ -80,7 +80,7 @@ class Search {
     }
   }
 
-  /// Takes a step. Returns false where it leaves the road or the path.
+  /// Takes a step. Returns false if the step leaves the road or the path.
   bool drive(int32_t action, Node* node_inout) const {
     constexpr float kFarthestAside_m = 3, kMaxAskew_rad = 1.6f;
     constexpr float kMinMargin_m = 0.02f, kMargin_m = 0.2f, kTight = 3;
