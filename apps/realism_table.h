@@ -5,7 +5,7 @@
 
 namespace pictura {
 
-/// Prints it on stdout, and what was left out on stderr.
+/// Prints the table on stdout, and on stderr what was left out.
 void print_realism(const RealismReport& report);
 
 }  // namespace pictura

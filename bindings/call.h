@@ -23,8 +23,8 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// Throws Error in a child of fork() if the parent had started threads or used CUDA, and this call needs them: both are
-/// gone in the child, and waiting for them would never end.
+/// Throws Error in a child of fork() if the parent had started threads or used CUDA, and this call needs them: the
+/// child has neither, and would wait for them indefinitely.
 void check_process(std::string_view what, int num_threads, Device device);
 
 /// Scope without the GIL. If a thread wants the GIL back while the interpreter ends, Python before 3.14 ends the thread

@@ -106,7 +106,7 @@ Inside inside_of(const py::handle& object, std::string_view what, std::string_vi
 /// Throws Error if a device was requested and the CPU was chosen; `choice` gives the reason.
 void check_device(std::string_view what, Device wanted, Device given, std::string_view choice);
 
-/// Converts a Python stream handle, an int; None: CUDA's legacy default stream. Throws UsageError for others.
+/// Converts a Python stream handle, an int; None: CUDA's legacy default stream. Throws UsageError for other values.
 Stream stream_of(const py::object& handle);
 
 /// Facts of a map, by name.

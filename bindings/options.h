@@ -25,7 +25,7 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// Returns the device of "cpu", "cuda" or "cuda:1". Throws UsageError for others.
+/// Returns the device of "cpu", "cuda" or "cuda:1". Throws UsageError for other names.
 Device device_of(const std::string& name);
 
 using ConditioningRanges = std::array<ConditioningRange, kNumConditioning>;

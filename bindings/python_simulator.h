@@ -247,7 +247,7 @@ class PySimulator {
   /// Steps with the commands of a controller.
   void run(PyController& controller, int64_t steps);
 
-  /// Runs steps in calls of 50 ms, between which ^C is handled and another thread may call, as between any calls.
+  /// Runs steps in calls of 50 ms. Between these calls ^C is handled, and another thread may call.
   template <typename Work>
   void run_steps(int64_t steps, const Work& step) {
     using Clock = std::chrono::steady_clock;

@@ -20,8 +20,8 @@ void launch_count_advantages(Span<const float> advantages, Span<const uint8_t> v
                              cudaStream_t stream);
 void launch_permute(const Permutation& permutation, Span<const int64_t> items, int64_t* items_out, cudaStream_t stream);
 
-/// The selected (asked or kept) indices in [0, count), in ascending order, and their number. Where `scratch` is null,
-/// the functions only return the required scratch bytes.
+/// The selected (asked or kept) indices in [0, count), in ascending order, and their number. If `scratch` is null, the
+/// functions only return the required scratch bytes.
 struct KeptTransitions {
   Span<const float> advantages;
   Span<const uint8_t> valid;

@@ -1,4 +1,4 @@
-// Device-independent preparation: the kernels' arguments from those of a call, and maps sorted for culling.
+// Device-independent preparation: converts a call's arguments to the kernels' arguments, and sorts maps for culling.
 #pragma once
 
 #include <string>

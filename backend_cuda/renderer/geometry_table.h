@@ -11,8 +11,8 @@
 
 namespace pictura::cuda {
 
-/// Table of maps. All calls need its device as the current device, and handles that were checked before. Memory of
-/// replaced or released maps is kept until the stream has passed that point, and is then reused.
+/// Table of maps. In all calls the table's device must be the current device, and handles must have been checked.
+/// Memory of replaced or released maps is kept until the stream has passed that call, and is then reused.
 class GeometryTable {
  public:
   /// Copies an empty table to the device on the default stream.

@@ -18,7 +18,7 @@ struct KernelTarget {
 };
 
 struct KernelCode {
-  std::string bytes;         // a cubin, or PTX where NVRTC is older than the architecture
+  std::string bytes;         // a cubin, or PTX if NVRTC is older than the architecture
   std::string architecture;  // sm_90, or compute_90 for PTX
   bool cached = false;       // read from the cache
 };

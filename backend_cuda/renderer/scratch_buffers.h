@@ -1,5 +1,5 @@
 // The renderer's scratch memory (all except images, scenes and maps): sizes and owners. Buffer is DeviceBuffer, or
-// std::vector where kernels are emulated.
+// std::vector if kernels are emulated.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/kernel_arguments.h"
@@ -7,8 +7,8 @@
 namespace pictura::cuda {
 
 /// Capacity of the pool per image, in faces and edges: the average need in CARLA's towns. Images that do not fit are
-/// drawn when the pool is free again. Four edges belong to each face; the rest, of which a third is used, is for
-/// clipped faces.
+/// drawn when the pool is free again. Four edges belong to each face. The other edges, of which a third is used, are
+/// for clipped faces.
 constexpr std::size_t kPoolFaces = 200, kPoolEdges = 928;
 /// Additional capacity in images, for batches of few images that may all have many faces.
 constexpr std::size_t kMinPoolImages = 4 * kMaxEntries / kPoolFaces + 1;

@@ -22,7 +22,7 @@ struct ScratchPlan {
 std::size_t bytes_of(const ScratchPlan& plan, const ScratchNeeds& needs);
 
 /// Plans as much of the needs as fits into max_bytes, at least one view and one block: first views, then blocks of the
-/// last launch, which has little work. Throws Error with the minimum in bytes if one of each does not fit.
+/// last launch, which has little work. Throws Error with the minimum in bytes if one view and one block do not fit.
 ScratchPlan plan_scratch(const ScratchNeeds& needs, std::size_t max_bytes);
 
 }  // namespace pictura::cuda

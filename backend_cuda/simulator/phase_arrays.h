@@ -32,8 +32,8 @@ struct PhaseArrays {
   const WorldScratch* scratch = nullptr;   // [num_worlds]
   const int32_t* world_of_slot = nullptr;  // [num_slots]
   int32_t num_worlds = 0, num_slots = 0;
-  // Agents of all worlds. The views also contain these pointers, but a kernel would read them from there again after
-  // each store.
+  // Agents of all worlds. The views also contain these pointers, but a kernel would read the pointers from a view again
+  // after each store.
   AgentStateView agents{}, next_agents{};
   // State, as in SimulatorState.
   uint64_t* seed = nullptr;
@@ -49,7 +49,7 @@ struct PhaseArrays {
   ObservationView observations;
   uint8_t entity_sets = 0;
   uint8_t has_lives = 0;            // whether some map has roads that end
-  uint8_t has_replayed_tracks = 0;  // whether some map has
+  uint8_t has_replayed_tracks = 0;  // whether some map has replayed tracks
   int32_t parked_per_world = 0;
   uint8_t has_crowds = 0;  // whether some world is a crowd
   // Between phases and steps.

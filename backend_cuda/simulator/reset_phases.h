@@ -17,9 +17,9 @@ struct TeamMemory {
 /// Chooses a try for each of `count` boxes, which are the world's boxes from first_box on, and adds the placed boxes to
 /// the standing ones. The chosen try is the first that the map permits and that is clear of the boxes before it and of
 /// the standing boxes: the result of placing the boxes sequentially. As many boxes as the team has groups choose at the
-/// same time, given the last choices of the others, until no choice changes. Then every choice agrees with the choices
-/// before it, which holds only for the sequential result. Every round fixes at least the lowest changed box. Choices of
-/// an earlier turn do not change.
+/// same time, given the last choices of the other boxes, until no choice changes. Then every choice agrees with the
+/// choices before it, which holds only for the sequential result. Every round fixes at least the lowest changed box.
+/// Choices of an earlier turn do not change.
 ///   box_of_try(i, try), permits(group, i, try, box)
 template <typename Team, typename BoxOfTry, typename Permits>
 PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,

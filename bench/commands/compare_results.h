@@ -22,7 +22,7 @@ struct Comparison {
 
 /// Compares rows of `name`, `value`, `unit`, `min` and `max` of two reports, by name; rows of only one report are
 /// omitted. Rates (units "..._per_s") are better when greater, times and memory (s, ms, GB, GiB) when smaller; other
-/// units have no direction. A change counts when the ranges of both do not overlap.
+/// units have no direction. A change counts if the ranges of both rows do not overlap.
 std::vector<Comparison> compare_results(const Json& before_rows, const Json& after_rows);
 
 /// An earlier report: output of `--json`.

@@ -25,10 +25,10 @@ struct TrainingMeasurement {
   TrainReport report;
 };
 
-/// Trains in a temporary folder. The learning rate stays constant, so that no schedule ends. Throws Error if an
-/// update took no agent-step or no minibatch. Throws Error if the policy, before its parameters change, gives
-/// actions other probabilities than in the rollout, because it then did not get the agents' observations. Throws the
-/// exceptions of train().
+/// Trains in a temporary folder. The learning rate stays constant, so that no schedule ends. Throws Error if an update
+/// took no agent-step or no minibatch. Throws Error if the policy, before its parameters change, gives actions other
+/// probabilities than in the rollout, which shows that it did not get the agents' observations. Throws the exceptions
+/// of train().
 TrainingMeasurement measure_training(const TrainingCase& training_case);
 
 /// Wall time of an update, and its part outside all phases.

@@ -26,7 +26,8 @@ Snapshot make_synthetic_town(uint64_t seed, int num_agents);
 Snapshot make_crowd();
 
 /// Four worlds on two towns: the second town, the first without agents, the first, and the second again without lights.
-/// The empty world has one view, and each other world has three, which alternately hide the vehicles of the others.
+/// The empty world has one view. Each other world has three views, each of which hides another third of the town's
+/// egos.
 struct SyntheticWorlds {
   std::vector<StaticGeometry> maps;
   SceneOwner scene;

@@ -19,15 +19,15 @@ constexpr double kWorstOracleError = 16.0 / 255;
 /// Maximum share of pixels whose planes have another surface than the truth: the pixel's centre lies on an edge to
 /// within rounding, or strips of two levels cross there and are ordered as a whole.
 constexpr double kPlaneShare = 1e-3;
-/// Maximum relative error of the depth plane where both have the same kind of surface.
+/// Maximum relative error of the depth plane at pixels where the truth has the same kind of surface.
 constexpr double kDepthError = 1e-3;
 /// Maximum visibility error of an agent of 4 pixels or more: the design's promise. The truth's own error is about 0.005
-/// there.
+/// for these agents.
 constexpr double kVisibilityError = 0.02;
 /// Maximum channel error of a scene that is moved as a whole. Single precision moves corners by about 1e-5 px per 100 m
 /// from the origin; a sample that changes to the other side of an edge costs up to 1/64 of a pixel twice.
 constexpr double kMovedSceneError = 8.0 / 255;
-/// Maximum share of values of a moved scene with larger changes than rounding.
+/// Maximum share of a moved scene's values that change by more than rounding.
 constexpr double kMovedSceneShare = 1e-3;
 /// Maximum relative difference between the sum of a box's faces and its silhouette: exact except for rounding and for
 /// the up to 1e-3 of a pixel at the border that counts as empty or full (kFullCoverage).
