@@ -10,7 +10,7 @@
 #include "pictura/common/support/numbers.h"
 #include "pictura/configuration/config_writer.h"
 #include "pictura/configuration/visit_keys.h"
-#include "pictura/map/load_map.h"
+#include "pictura/configuration/visit_paths.h"
 
 namespace pictura {
 
@@ -91,26 +91,9 @@ std::vector<std::string> settings_without_effect(const Config& config) {
 }
 
 Config with_absolute_paths(Config config) {
-  const auto make_absolute = [](std::string* file_inout) {
-    *file_inout = std::filesystem::absolute(*file_inout).lexically_normal().string();
-  };
-  if (!config.render.rig.empty()) make_absolute(&config.render.rig);
-  if (config.policy.backbone != "conv") make_absolute(&config.policy.backbone);
-  if (!config.train.teacher.empty()) make_absolute(&config.train.teacher);
-  for (std::string& text : config.simulator.other_policies) {
-    std::string file = parse_share(text)->name;
-    const std::string share = text.substr(file.size());
-    make_absolute(&file);
-    text = file + share;
-  }
-  for (std::string& map : config.simulator.maps) {
-    if (std::optional<std::string> scenes = scene_source(map)) {
-      make_absolute(&*scenes);
-      map = map_of_scenes(*scenes);
-    } else if (is_map_file(map)) {
-      make_absolute(&map);
-    }
-  }
+  visit_paths(&config, [](std::string_view, std::string* path_inout) {
+    *path_inout = std::filesystem::absolute(*path_inout).lexically_normal().string();
+  });
   return config;
 }
 

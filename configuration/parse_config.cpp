@@ -16,7 +16,7 @@
 #include "pictura/configuration/config_writer.h"
 #include "pictura/configuration/removed_keys.h"
 #include "pictura/configuration/visit_keys.h"
-#include "pictura/map/load_map.h"
+#include "pictura/configuration/visit_paths.h"
 #include "pictura/simulator/conditioning_lookup.h"
 
 namespace pictura {
@@ -556,32 +556,11 @@ Config load_config(const std::string& path, const std::vector<std::string>& over
       return text.starts_with(key) && text.substr(key.size()).starts_with('=');
     });
   };
-  const auto beside_config = [&path](std::string* file_inout) {
-    const std::filesystem::path file(*file_inout);
-    if (file.empty() || file.is_absolute()) return;
-    *file_inout = (std::filesystem::path(path).parent_path() / file).lexically_normal().string();
-  };
-  if (!is_overridden("render.rig")) beside_config(&config.render.rig);
-  if (config.policy.backbone != "conv" && !is_overridden("policy.backbone")) beside_config(&config.policy.backbone);
-  if (!is_overridden("train.teacher")) beside_config(&config.train.teacher);
-  if (!is_overridden("simulator.others.policies")) {
-    for (std::string& text : config.simulator.other_policies) {
-      NamedShare policy = *parse_share(text);
-      const std::string share = text.substr(policy.name.size());
-      beside_config(&policy.name);
-      text = policy.name + share;
-    }
-  }
-  if (!is_overridden("simulator.maps")) {
-    for (std::string& map : config.simulator.maps) {
-      if (std::optional<std::string> scenes = scene_source(map)) {
-        beside_config(&*scenes);
-        map = map_of_scenes(*scenes);
-      } else if (is_map_file(map)) {
-        beside_config(&map);
-      }
-    }
-  }
+  visit_paths(&config, [&](std::string_view key, std::string* path_inout) {
+    const std::filesystem::path file(*path_inout);
+    if (file.empty() || file.is_absolute() || is_overridden(key)) return;
+    *path_inout = (std::filesystem::path(path).parent_path() / file).lexically_normal().string();
+  });
   return config;
 }
 
