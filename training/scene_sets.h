@@ -47,7 +47,7 @@ class SceneSets {
   /// Returns a set, waiting until it is prepared, and begins to prepare the next one. Throws Error if no scene can be
   /// used.
   SceneSet take(int64_t number);
-  /// Messages about scenes that are left out, since the last call.
+  /// Returns the messages about scenes that were left out since the last call.
   std::vector<std::string> take_notices();
 
  private:
@@ -66,7 +66,7 @@ class SceneSets {
   std::vector<std::string> notices_;
   // Members of the thread that prepares.
   Maps maps_;                  // maps of the last prepared set
-  std::set<size_t> unusable_;  // scenes
+  std::set<size_t> unusable_;  // scenes that cannot be used
   std::vector<std::string> new_notices_;
   int64_t next_number_ = -1;
   std::future<SceneSet> next_;  // set next_number_, if valid

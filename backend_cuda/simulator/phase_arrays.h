@@ -50,8 +50,8 @@ struct PhaseArrays {
   uint8_t entity_sets = 0;
   uint8_t has_lives = 0;            // whether some map has roads that end
   uint8_t has_replayed_tracks = 0;  // whether some map has replayed tracks
-  int32_t parked_per_world = 0;
-  uint8_t has_crowds = 0;  // whether some world is a crowd
+  int32_t parked_per_world = 0;     // boxes of a world that belong to no agent
+  uint8_t has_crowds = 0;           // whether some world is a crowd
   // Between phases and steps.
   uint8_t* began = nullptr;          // [num_worlds] an episode began in the last step: the next episode is to be made
   uint8_t* prepares = nullptr;       // [num_worlds] whether that episode is made in the current step

@@ -46,7 +46,7 @@ struct Advance {
   }
 };
 
-/// Phase that moves a replayed track's box: box `index % boxes_per_world` of a world's boxes that belong to no agent.
+/// Phase that moves a replayed track's box: box `index % parked_per_world` of a world's boxes that belong to no agent.
 struct ReplayTracks {
   PhaseArrays arrays;
   template <typename ThreadGroup>

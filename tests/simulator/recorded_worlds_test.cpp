@@ -119,7 +119,7 @@ TEST(RecordedWorlds, ReplayedTracksAreBoxesThatFollowTheRecord) {
   EXPECT_NE(map->fingerprint, with_tracks(*whole, driven, driven, kAgents)->fingerprint);
   const auto simulator = make_simulator("cpu", config, CompiledMaps{map}, {{0, kAgents, 0}, {0, 1, 1}});
   EXPECT_EQ(simulator->spawn_report().spawned, 2 + 1);
-  // The same scene with all tracks as agents that follow the record.
+  // Worlds of the same scene in which all tracks are agents that follow the record.
   const auto as_agents = world_of(scene, 0, {.auxiliary_observations = true});
   const std::vector<int32_t> actions(kAgents + 1, kIdleAction);
   int32_t step = 0;
