@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "pictura/common/portable/hypot.h"
+#include "pictura/common/hypot.h"
 
 namespace pictura {
 

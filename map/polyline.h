@@ -14,7 +14,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/math.h"
-#include "pictura/common/portable/hypot.h"
+#include "pictura/common/hypot.h"
 #include "pictura/common/support/interrupt.h"
 
 namespace pictura {

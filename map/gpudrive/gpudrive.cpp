@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "pictura/common/error.h"
-#include "pictura/common/portable/hypot.h"
+#include "pictura/common/hypot.h"
 #include "pictura/common/support/json.h"
 
 namespace pictura::gpudrive {

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "pictura/common/error.h"
-#include "pictura/common/portable/hypot.h"
+#include "pictura/common/hypot.h"
 
 namespace pictura {
 

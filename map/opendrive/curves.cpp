@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "pictura/common/portable/hypot.h"
+#include "pictura/common/hypot.h"
 
 namespace pictura::opendrive {
 

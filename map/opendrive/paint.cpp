@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "pictura/common/portable/hypot.h"
+#include "pictura/common/hypot.h"
 #include "pictura/map/opendrive/build.h"
 #include "pictura/map/stripes.h"
 

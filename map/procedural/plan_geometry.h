@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-#include "pictura/common/portable/hypot.h"
+#include "pictura/common/hypot.h"
 #include "pictura/map/opendrive/model.h"
 
 namespace pictura::town {

@@ -120,7 +120,7 @@ def faults_in(root: pathlib.Path) -> list[str]:
                 if OTHER_PARSER.search(line):
                     faults.append(f"{where} expected a parser of common/support/numbers.h, which no locale changes")
                 if OTHER_HYPOT.search(line) and name.startswith("map/"):
-                    faults.append(f"{where} expected hypot_of() of common/portable/hypot.h, which no processor changes")
+                    faults.append(f"{where} expected hypot_of() of common/hypot.h, which no processor changes")
                 if OTHER_PRINTER.search(line) and name != PRINTER_HOME:
                     faults.append(f"{where} expected print_result() or print_message() of {PRINTER_HOME}")
                 if OTHER_WRITER.search(line) and name not in MAY_APPEND:

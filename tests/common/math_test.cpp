@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pictura/common/portable/hypot.h"
+#include "pictura/common/hypot.h"
 #include "pictura/common/support/hash.h"
 
 namespace pictura {
