@@ -1,14 +1,17 @@
 #include "pictura/map/import.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
+#include <filesystem>
 
+#include "pictura/common/error.h"
 #include "pictura/common/hypot.h"
 
 namespace pictura {
 
-void check_import_options(const OpenDriveOptions& options) {
+namespace {
+
+void check(const OpenDriveOptions& options) {
   PICTURA_CHECK(options.chord_error_m >= 1e-3f && options.chord_error_m <= 10.0f,
                 "import options: expected a chord error in [0.001, 10] m, got {}", options.chord_error_m);
   const PlanMap& plan = options.plan;
@@ -20,11 +23,50 @@ void check_import_options(const OpenDriveOptions& options) {
                 plan.xx, plan.xy, plan.yx, plan.yy);
 }
 
-/// CARLA's towns need 0.2 samples per byte, procedural ones 0.7, of which the largest has 35 MB, and a straight road of
-/// 100 km half a million.
-SampleBudget import_budget(std::size_t text_bytes, const std::string& source, const InterruptibleWork& work) {
+}  // namespace
+
+MapImport::MapImport(std::size_t text_bytes, const std::string& source, const OpenDriveOptions& import_options,
+                     const ImportProgress& progress)
+    : options(import_options),
+      faults(import_options.strict),
+      text_bytes_(text_bytes),
+      source_(source),
+      progress_(progress),
+      work_(fmt::format("{}: interrupted while it was imported", source)) {
+  map.name = std::filesystem::path(source).stem().string();
+}
+
+void MapImport::begin(const char* stage, double done) const {
+  work_.check();
+  if (progress_) progress_(stage, done);
+}
+
+// CARLA's towns need 0.2 samples per byte, procedural ones 0.7, of which the largest has 35 MB, and a straight road of
+// 100 km half a million.
+SampleBudget MapImport::budget() const {
   constexpr std::int64_t kBaseSamples = 500'000, kSamplesPerByte = 10, kMaxSamples = 60'000'000;
-  return {std::min(kMaxSamples, kBaseSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes)), source, work};
+  return {std::min(kMaxSamples, kBaseSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes_)), source_,
+          work_};
+}
+
+RoadMap import_map(std::size_t text_bytes, const std::string& source, const OpenDriveOptions& options,
+                   const ImportProgress& progress, const std::function<void(MapImport* import)>& fill) {
+  check(options);
+  try {
+    MapImport import(text_bytes, source, options, progress);
+    fill(&import);
+    import.map.mends = import.faults.take();
+    validate(import.map);
+    return std::move(import.map);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const UsageError&) {
+    throw;
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    if (message.starts_with(source)) throw;
+    fail("{}: {}", source, message);
+  }
 }
 
 }  // namespace pictura

@@ -13,8 +13,8 @@
 #include <Eigen/Core>
 
 #include "pictura/common/error.h"
-#include "pictura/common/math.h"
 #include "pictura/common/hypot.h"
+#include "pictura/common/math.h"
 #include "pictura/common/support/interrupt.h"
 
 namespace pictura {

@@ -1,8 +1,5 @@
 #include "pictura/map/opendrive/opendrive.h"
 
-#include <filesystem>
-
-#include "pictura/common/error.h"
 #include "pictura/map/import.h"
 #include "pictura/map/open_lanes.h"
 #include "pictura/map/opendrive/build.h"
@@ -15,57 +12,46 @@ namespace pictura {
 
 namespace {
 
-/// Imports the network. Errors that concern the network as a whole do not name the file; the caller adds the name.
-RoadMap import_network(std::string_view text, const std::string& source, const OpenDriveOptions& options,
-                       const ImportProgress& progress) {
-  const InterruptibleWork work(fmt::format("{}: interrupted while it was imported", source));
+void import_network(std::string_view text, const std::string& source, MapImport* import) {
   // Shares of the work, measured on large networks.
-  const auto begin = [&](const char* stage, double done) {
-    work.check();
-    if (progress) progress(stage, done);
-  };
-  begin("reading", 0);
-  opendrive::Faults faults(options.strict);
+  import->begin("reading", 0);
   opendrive::Network network;
-  opendrive::read_network(text, source, &faults, &network);
+  opendrive::read_network(text, source, &import->faults, &network);
   opendrive::split_at_speed_changes(&network);
   opendrive::split_at_lights(&network);
 
-  RoadMap map;
-  map.name = std::filesystem::path(source).stem().string();
+  const OpenDriveOptions& options = import->options;
+  RoadMap& map = import->map;
   if (options.plan == PlanMap{}) {
     map.geo_reference = network.geo_reference;
   } else {
     opendrive::deform(options.plan, &network);  // a deformed copy has no place on Earth
   }
-  opendrive::Build build{network, options, &faults, &map, import_budget(text.size(), source, work), {}, {}, {}};
-  begin("lanes", 0.1);
+  opendrive::Build build{network, options, &import->faults, &map, import->budget(), {}, {}, {}};
+  import->begin("lanes", 0.1);
   opendrive::choose_origin(&build);
   opendrive::build_lanes(&build);
   opendrive::link_lanes(&build);
   opendrive::set_speed_limits(&build);
   find_endless_lanes(&map);
-  begin("road edges", 0.2);
+  import->begin("road edges", 0.2);
   opendrive::build_road_edges(&build);
   if (!has_endless_roads(map)) opendrive::open_road_ends(&build);
-  begin("markings", 0.8);
+  import->begin("markings", 0.8);
   opendrive::build_markings(&build);
   opendrive::build_objects(&build);
   opendrive::build_signals(&build);
-  begin("building lines", 0.85);
+  import->begin("building lines", 0.85);
   opendrive::build_building_lines(&build);
   opendrive::count_facts(&build);
-  map.mends = faults.take();
-  validate(map);
-  return map;
 }
 
 }  // namespace
 
 RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options,
                         const ImportProgress& progress) {
-  check_import_options(options);
-  return import_named(source, [&] { return import_network(text, source, options, progress); });
+  return import_map(text.size(), source, options, progress,
+                    [&](MapImport* import) { import_network(text, source, import); });
 }
 
 }  // namespace pictura
