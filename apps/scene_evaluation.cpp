@@ -20,8 +20,6 @@ namespace pictura {
 
 namespace {
 
-constexpr size_t kShownFaults = 10;
-
 double parse_density(const std::string& text) {
   const std::optional<double> percent = parse_number(text);
   if (!percent || !(*percent > 0) || *percent > 100) {
@@ -111,17 +109,8 @@ void print_report(const DriverOptions& options, const SceneEvaluation& evaluatio
   print_json(json);
 }
 
-void print_faults(const std::vector<std::string>& faults) {
-  for (size_t i = 0; i < std::min(faults.size(), kShownFaults); ++i) {
-    print_message("warning: left out: {}\n", printable(faults[i]));
-  }
-  if (faults.size() > kShownFaults) {
-    print_message("warning: {} more are left out; --json lists all\n", faults.size() - kShownFaults);
-  }
-}
-
 void print(const DriverOptions& options, const SceneEvaluation& evaluation, bool json) {
-  print_faults(evaluation.faults());
+  print_warnings("left out", evaluation.faults());
   if (json)
     print_report(options, evaluation);
   else

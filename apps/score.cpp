@@ -7,26 +7,11 @@
 
 namespace pictura {
 
-namespace {
-
-constexpr size_t kShownNames = 10;
-
-void warn_of(const std::vector<std::string>& names, const char* what) {
-  for (size_t i = 0; i < std::min(names.size(), kShownNames); ++i) {
-    print_message("warning: {}: {}\n", what, printable(names[i]));
-  }
-  if (names.size() > kShownNames) {
-    print_message("warning: {} more; --json lists all\n", names.size() - kShownNames);
-  }
-}
-
-}  // namespace
-
 void print_realism(const RealismReport& report) {
-  warn_of(report.faults, "left out");
+  print_warnings("left out", report.faults);
   std::vector<std::string> unused;
   for (const std::string& id : report.unused) unused.push_back(fmt::format("scenario '{}'", id));
-  warn_of(unused, "rollouts without a scene");
+  print_warnings("rollouts without a scene", unused);
   int64_t road_users = 0;
   for (const SceneRealism& scene : report.scenes) road_users += scene.scored;
   const RealismVersion& version = realism_version(report.version);

@@ -15,6 +15,16 @@ namespace pictura {
 
 void print_json(const Json& object) { print_result_text(json_text(object, 2) + "\n"); }
 
+void print_warnings(const std::string& what, const std::vector<std::string>& texts) {
+  constexpr size_t kShown = 10;
+  for (size_t i = 0; i < std::min(texts.size(), kShown); ++i) {
+    print_message("warning: {}: {}\n", what, printable(texts[i]));
+  }
+  if (texts.size() > kShown) {
+    print_message("warning: {}: {} more; --json lists all\n", what, texts.size() - kShown);
+  }
+}
+
 std::string format_duration(double seconds) {
   if (!std::isfinite(seconds)) return "?";
   const auto total = static_cast<long>(std::lround(seconds));

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pictura/common/renderer.h"
 #include "pictura/common/support/json.h"
@@ -13,6 +14,9 @@ namespace pictura {
 
 /// Prints one object and a newline to stdout.
 void print_json(const Json& object);
+
+/// Warns of each text, after `what`; of more than ten texts, prints ten and the number of the others.
+void print_warnings(const std::string& what, const std::vector<std::string>& texts);
 
 /// Text of a duration: "1 h 02 min", "3 min 05 s" or "12 s".
 std::string format_duration(double seconds);
