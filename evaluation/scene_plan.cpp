@@ -16,19 +16,6 @@ namespace pictura {
 
 namespace {
 
-const RecordedState& state_of(const CompiledMap& map, size_t track, int32_t step) {
-  const MapRecord& record = map.rules.record;
-  return record.states[track * static_cast<size_t>(record.num_steps) + static_cast<size_t>(step)];
-}
-
-/// First episode step at which the track is present; -1: none.
-int32_t first_step(const CompiledMap& map, size_t track) {
-  for (int32_t step = 0; step < map.rules.record.num_steps; ++step) {
-    if (state_of(map, track, step).is_present) return step;
-  }
-  return -1;
-}
-
 /// Whether an agent cannot start driving from its box, because the box touches an edge, is off the road, or touches a
 /// box that is not removed.
 bool overlaps(const MapView& map, Span<const AgentBox> boxes, const std::vector<SceneRole>& roles, size_t track) {
@@ -44,14 +31,15 @@ bool overlaps(const MapView& map, Span<const AgentBox> boxes, const std::vector<
 /// Episode step at which each track would be taken over, ignoring overlaps and thinning, [tracks]; -1: never.
 std::vector<int32_t> takeovers(const CompiledMap& map, const SceneProtocol& protocol) {
   const Scenario& scene = *map.scenario;
+  const MapRecord& record = map.rules.record;
   const std::vector<uint8_t> named = tracks_selected_by(scene, protocol.control);
   std::vector<int32_t> steps(named.size(), -1);
   for (size_t track = 0; track < named.size(); ++track) {
     if (!named[track]) continue;
     if (protocol.replay_experts && scene.tracks[track].control == RecordedControl::expert) continue;
-    const int32_t step = first_step(map, track);
+    const int32_t step = record.first_step(track);
     if (step < 0 || (step > 0 && protocol.late != Late::drive)) continue;
-    const Vec3 from = state_of(map, track, step).position_m, goal = map.rules.record.agents[track].goal_m;
+    const Vec3 from = record.state(track, step).position_m, goal = record.agents[track].goal_m;
     if (protocol.min_distance_to_goal_m > 0 && passes(from, from, goal, protocol.min_distance_to_goal_m)) continue;
     steps[track] = step;
   }
@@ -131,7 +119,7 @@ std::vector<Vec3> path_waypoints(const CompiledMap& map, int32_t track, int32_t 
   std::vector<Vec3> path;
   std::vector<float> way_m;
   for (int32_t step = takeover_step; step < map.rules.record.num_steps; ++step) {
-    const RecordedState& state = state_of(map, index, step);
+    const RecordedState& state = map.rules.record.state(index, step);
     if (!state.is_present) continue;
     way_m.push_back(path.empty() ? 0.0f : way_m.back() + length((state.position_m - path.back()).xy()));
     path.push_back(state.position_m);

@@ -558,6 +558,13 @@ int64_t MapRules::size_bytes() const {
   return static_cast<int64_t>(sum);
 }
 
+int32_t MapRecord::first_step(size_t agent) const {
+  for (int32_t step = 0; step < num_steps; ++step) {
+    if (state(agent, step).is_present) return step;
+  }
+  return -1;
+}
+
 MapView MapRules::view() const {
   MapView view;
   view.segments = segments;

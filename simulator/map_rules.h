@@ -33,6 +33,12 @@ struct MapRecord {
   int32_t num_steps = 0;
   int32_t first_replayed = 0;  // see MapView
   float dt_s = 0.1f;
+
+  const RecordedState& state(size_t agent, int32_t step) const {
+    return states[agent * static_cast<size_t>(num_steps) + static_cast<size_t>(step)];
+  }
+  /// First episode step at which the agent is present; -1: none.
+  int32_t first_step(size_t agent) const;
 };
 
 struct MapRules {

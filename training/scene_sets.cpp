@@ -19,9 +19,8 @@ namespace {
 /// First recorded place of a track; the track must have one.
 Vec2 first_place(const CompiledMap& map, int32_t track) {
   const MapRecord& record = map.rules.record;
-  const auto first = record.states.begin() + int64_t{track} * record.num_steps;
-  return std::find_if(first, first + record.num_steps - 1, [](const RecordedState& s) { return s.is_present != 0; })
-      ->position_m.xy();
+  const auto agent = static_cast<size_t>(track);
+  return record.state(agent, record.first_step(agent)).position_m.xy();
 }
 
 /// Sorts tracks by the distance from their first recorded place to the nearest first place of a driven track.

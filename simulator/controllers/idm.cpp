@@ -14,9 +14,8 @@ namespace {
 
 FollowedPath path_of(const MapRecord& record, size_t agent) {
   FollowedPath path;
-  const auto num_steps = static_cast<size_t>(record.num_steps);
-  for (size_t step = 0; step < num_steps; ++step) {
-    const RecordedState& state = record.states[agent * num_steps + step];
+  for (int32_t step = 0; step < record.num_steps; ++step) {
+    const RecordedState& state = record.state(agent, step);
     if (!state.is_present) continue;
     path.add(state.position_m, state.heading_rad);
   }
