@@ -1,6 +1,6 @@
-// Arrays at public interfaces: a pointer with element type, shape, strides and device; the caller owns the memory. An
-// argument is checked against the expected type, shape and device, and an error names the difference. Kernels take
-// spans, see span.h.
+// Arrays at public interfaces. An Array is a pointer with element type, shape, strides and device; the caller owns the
+// memory. Array::checked() compares an argument with the expected type, shape and device. Kernels take spans instead
+// (span.h).
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ std::string_view name_of(ElementType type);
 /// Name of a device, such as "cpu" or "cuda:0".
 std::string name_of(Device device);
 
-/// Storage type of the elements of a C++ type: the underlying integer of an enumeration.
+/// Type that stores a T in an array: the underlying integer if T is an enumeration, else T without const.
 template <typename T>
 struct Stored {
   using Type = std::remove_const_t<T>;
@@ -36,7 +36,7 @@ struct Stored<T> {
 template <typename T>
 using StoredAs = typename Stored<T>::Type;
 
-/// Element type of a C++ type. No C++ type maps to f16 or bf16.
+/// ElementType of a C++ type. No C++ type maps to f16 or bf16.
 template <typename T>
 consteval ElementType element_type() {
   using U = StoredAs<T>;
@@ -66,7 +66,7 @@ class Dims {
   int64_t& operator[](int dimension) { return values_[dimension]; }
   /// Product of all lengths.
   int64_t count() const;
-  /// Strides, in elements, of an array of these lengths without gaps, the last dimension fastest.
+  /// Strides, in elements, of a gapless array with these lengths. The last dimension varies fastest.
   Dims contiguous_strides() const;
   bool operator==(const Dims& other) const;
   /// Text such as "[4096, 7]".
@@ -82,7 +82,7 @@ struct Array {
   void* data = nullptr;
   ElementType type = ElementType::u8;
   bool is_read_only = false;
-  Dims shape, strides;  // in elements
+  Dims shape, strides;  // strides in elements
   Device device;
 
   Array() = default;
@@ -94,16 +94,16 @@ struct Array {
       : Array(const_cast<std::remove_const_t<T>*>(first), element_type<T>(), its_shape, its_device) {
     is_read_only = std::is_const_v<T>;
   }
-  /// Covers a whole host container, with shape [size], so that functions accept a std::vector directly.
+  /// Views a whole host container, with shape [size]. Functions that take an Array therefore accept a std::vector.
   template <typename Container>
     requires ArrayElement<std::remove_cvref_t<decltype(*std::declval<Container&>().data())>>
   Array(Container&& container)  // NOLINT: converts
       : Array(container.data(), {static_cast<int64_t>(container.size())}, Device{}) {}
 
   bool is_contiguous() const { return strides == shape.contiguous_strides(); }
-  /// Returns the elements of a contiguous array as a span. Throws Error if element type, shape or device differ, the
-  /// array has gaps, or T is not const and the array is read-only. The error names `what` ("step: actions"), the
-  /// expected and the actual array.
+  /// Returns the elements of a contiguous array as a span. Throws Error if the element type, shape or device differs,
+  /// if the array has gaps, or if T is not const but the array is read-only. The message contains `what` (such as
+  /// "step: actions"), the expected array and the actual array.
   template <typename T>
   Span<T> checked(std::string_view what, const Dims& expected_shape, Device expected_device) const {
     check(what, element_type<T>(), !std::is_const_v<T>, expected_shape, expected_device);

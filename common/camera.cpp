@@ -107,8 +107,8 @@ Rig load_rig(const std::string& path) {
 
 CameraAxes camera_axes(const Camera& camera) {
   using Eigen::AngleAxisd, Eigen::Vector3d;
-  // Columns right, down and forward, in a frame with x forward, y left and z up. Rotated axis by axis: with a
-  // quaternion, level directions would be level only up to rounding.
+  // The columns are the camera's right, down and forward, in a frame with x forward, y left and z up. The matrix is
+  // rotated axis by axis, because with a quaternion, horizontal directions would be horizontal only up to rounding.
   Eigen::Matrix3d axes;
   axes << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   axes = AngleAxisd(camera.roll_rad, Vector3d::UnitX()).toRotationMatrix() * axes;

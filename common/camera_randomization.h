@@ -1,19 +1,20 @@
-// Randomization of a rig's cameras and of their images. Robust policies are trained with deviations of the mounting,
-// and are evaluated at given deviations. The rule is in common/raster/randomize_camera.h.
+// Randomization of a rig's cameras and of their images. Training with such deviations makes policies robust;
+// evaluations test policies at given deviations. common/raster/randomize_camera.h draws the random values.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// Ranges of the random values that are drawn per episode and camera, or per step. All 0: no randomization.
+/// Ranges of the random values, which are drawn once per episode and camera unless noted otherwise. If all ranges are
+/// 0, nothing is randomized.
 struct CameraRandomization {
   uint64_t seed = 0;
   double rotation_deg = 0;         // yaw, pitch and roll about the camera's own axes: uniform in +-rotation_deg
   double shift_m = 0;              // along each axis of the ego frame: uniform in +-shift_m
   double focal_share = 0;          // factor on both focal lengths: uniform in 1 +- focal_share
   double brightness_share = 0;     // factor on all channels: uniform in 1 +- brightness_share
-  double noise_share = 0;          // standard deviation of a channel's noise per step, as a share of full brightness
+  double noise_share = 0;          // noise of a channel per step: standard deviation as a share of full brightness
   double dead_probability = 0;     // probability that a camera is black for the episode
   double dropped_probability = 0;  // probability that an image is black in one step
 
@@ -27,7 +28,7 @@ struct CameraRandomization {
   bool operator==(const CameraRandomization&) const = default;
 };
 
-/// Upper bounds of the ranges: cameras stay near their mounting, and images are not inverted.
+/// Upper bounds of the ranges. Within them, cameras stay near their mounting, and no brightness factor is negative.
 constexpr CameraRandomization kMaxCameraRandomization{.rotation_deg = 45,
                                                       .shift_m = 1,
                                                       .focal_share = 0.5,
@@ -36,7 +37,7 @@ constexpr CameraRandomization kMaxCameraRandomization{.rotation_deg = 45,
                                                       .dead_probability = 1,
                                                       .dropped_probability = 1};
 
-/// Ranges at severity 1 of evaluations (docs/explanation/cameras.md explains the values).
+/// Ranges of an evaluation at severity 1; other severities scale them. docs/explanation/cameras.md explains the values.
 constexpr CameraRandomization kFullCameraSeverity{.rotation_deg = 6,
                                                   .shift_m = 0.2,
                                                   .focal_share = 0.1,
@@ -45,7 +46,7 @@ constexpr CameraRandomization kFullCameraSeverity{.rotation_deg = 6,
                                                   .dead_probability = 0.1,
                                                   .dropped_probability = 0.1};
 
-/// Upper bound of severities: no scaled range exceeds kMaxCameraRandomization.
+/// Maximum severity of an evaluation. It scales no range of kFullCameraSeverity above kMaxCameraRandomization.
 constexpr double kMaxCameraSeverity = 2;
 
 /// Scales all ranges by a factor. The random draws do not change: a camera turns in the same direction, by a scaled

@@ -1,11 +1,12 @@
-// Cells of a grid within reach of a point, row by row; shared by both devices.
+// Cells of a grid near a point, row by row. Shared by host and CUDA code.
 #pragma once
 
 #include "pictura/common/grid_view.h"
 
 namespace pictura {
 
-/// A rectangle of cells. The items of one row of cells are contiguous.
+/// A rectangle of cells. The items of cell row y are contiguous in the grid's list: from begin(cells, y) up to
+/// end(cells, y).
 struct CellRows {
   int x0 = 0, x1 = 0, y0 = 0, y1 = 0;
   PICTURA_HD int32_t begin(const GridView& cells, int y) const { return cells.begin[y * cells.num_x + x0]; }

@@ -1,23 +1,24 @@
-// The palette: one base colour per kind of primitive (per face for agents), and the range at which all colours have
-// faded to black. Vehicles have RAP's colours (vita-epfl/RAP, renderer.py); docs/explanation/image.md lists the other
-// hues.
+// The palette of rendered images: one base colour per kind of primitive, or per face for agents. Colours fade to black
+// with distance. Vehicles have the colours of RAP (vita-epfl/RAP, renderer.py); docs/explanation/image.md lists the
+// other colours.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// Colour with channels in [0, 1]; files (color_rgb of scenes, PNG) hold 0 to 255, see rgb8().
+/// Colour with channels in [0, 1]. Files (color_rgb in scene files, PNG) store channels from 0 to 255; rgb8() converts
+/// them.
 struct Rgb {
   float r = 0, g = 0, b = 0;
 };
 
-/// Storage of a channel: a byte; a half or float in [0, 1]; or a bfloat16 that holds the byte's value, 0 to 255,
+/// Storage of a channel. u8: 0 to 255; f16 and f32: 0 to 1; bf16: 0 to 255, the value of u8, which a bfloat16 holds
 /// exactly.
 enum class PixelFormat : uint8_t { u8, f16, f32, bf16 };
 
-/// Layout of an image: [3, height, width]; [height, width, 3]; or patches (patches.h), [rows, columns, values of a
-/// patch], which are black beyond the image.
+/// Layout of an image. planar: [3, height, width]. interleaved: [height, width, 3]. patches: [rows of patches, columns
+/// of patches, values of a patch] (patches.h); the part of a patch beyond the image is black.
 enum class ChannelOrder : uint8_t { planar, interleaved, patches };
 
 PICTURA_HD constexpr Rgb rgb8(int r, int g, int b) {
@@ -32,11 +33,11 @@ constexpr int kNumAgentClasses = 3;
 enum class BoxFace : uint8_t { front, back, left, right, top };
 constexpr int kNumBoxFaces = 5;
 
-/// Range at which every colour has faded to black.
+/// Depth at which every colour has faded to black.
 constexpr float kVisibleRange_m = 120.0f;
 
 PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
-  // Conditionals instead of a table, which each thread of a kernel would have to build in its local memory first.
+  // Conditionals instead of a table, because each thread of a kernel would first build the table in its local memory.
   auto chosen = [face](Rgb front, Rgb back, Rgb left, Rgb right, Rgb top) {
     const Rgb of_sides = face == BoxFace::left ? left : face == BoxFace::right ? right : top;
     return face == BoxFace::front ? front : face == BoxFace::back ? back : of_sides;
@@ -51,8 +52,8 @@ PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
   }
 }
 
-/// State of a traffic light. Lights in state `unknown` (the recording has no state) are not drawn, nor are the lights
-/// of worlds without states. Saved files hold these numbers.
+/// State of a traffic light. `unknown` means that a recording has no state for the light. Unknown lights, and all
+/// lights of a world without light states, are not drawn. Saved files contain these numbers.
 enum class LightState : uint8_t { off, red, yellow, green, unknown };
 constexpr int kNumLightStates = 5;
 

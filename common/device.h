@@ -15,7 +15,7 @@ struct Device {
   PICTURA_HD constexpr bool is_host() const { return space == MemorySpace::host; }
 };
 
-/// A cudaStream_t without CUDA's headers. Null on the host, where calls are synchronous.
+/// A cudaStream_t, declared without CUDA headers. On the host, the handle is null and calls are synchronous.
 struct Stream {
   void* handle = nullptr;
 };

@@ -1,12 +1,13 @@
-// Error types of the library. A message names the place (file, line, element), the expected and the actual value. The
-// library never prints or exits; the command-line program turns an Error into one `error: ...` line and an exit status.
+// Error types of the library. A message names the place (file, line, element), the expected value and the actual value.
+// The library never prints or exits; the command-line program turns an Error into one `error: ...` line and an exit
+// status.
 #pragma once
 
 #include <stdexcept>
 
 namespace pictura {
 
-/// Failed work: bad input, a missing file, a full disk.
+/// Failure of requested work, for example bad input, a missing file or a full disk.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -33,7 +33,7 @@ Grid::Grid(Span<const Aabb2> boxes, float cell_m) : cell_m_(cell_m), num_boxes_(
                 "grid: {} items over {} x {} m lie in {} cells of {} m, expected at most {}", boxes.size(),
                 high.x - low.x, high.y - low.y, num_entries, cell_m, kMaxEntries);
 
-  // Counting sort: the number of items of each cell, the start of its range, then the items in order.
+  // Counting sort: count the items of each cell, compute the start of each cell's range, then store the items in order.
   begin_.assign(static_cast<std::size_t>(num_x_) * static_cast<std::size_t>(num_y_) + 1, 0);
   for (const Aabb2& box : boxes) visit_cells(grid, box, [&](std::size_t cell) { ++begin_[cell + 1]; });
   for (std::size_t cell = 1; cell < begin_.size(); ++cell) begin_[cell] += begin_[cell - 1];

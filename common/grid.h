@@ -1,5 +1,5 @@
-// A uniform grid over the ground plane in compressed rows: the items that touch each square cell. Built on the host,
-// read on both devices.
+// A uniform grid over the ground plane: for each square cell, the items that touch the cell, in compressed rows (CSR).
+// The host builds the grid; host and CUDA code read it.
 #pragma once
 
 #include <vector>
@@ -11,8 +11,8 @@ namespace pictura {
 class Grid {
  public:
   Grid() = default;
-  /// Puts item i into every cell that boxes[i] touches. Throws if a box is not finite, if the area would need more than
-  /// 2^26 cells, or if all items together touch more than 2^27 cells.
+  /// Puts item i into every cell that boxes[i] touches. Throws Error if a box is not finite, if the area would need
+  /// more than 2^26 cells, or if all items together touch more than 2^27 cells.
   Grid(Span<const Aabb2> boxes, float cell_m);
   GridView view() const { return {origin_m_, cell_m_, num_x_, num_y_, begin_, items_}; }
   /// Number of boxes that the grid was built from.

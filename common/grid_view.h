@@ -1,5 +1,5 @@
-// A uniform grid over the ground plane as both devices read it: the items that touch each square cell, in compressed
-// rows. Grid in grid.h builds it on the host.
+// Non-owning view of a uniform grid over the ground plane, for host and CUDA code. The grid lists, for each square
+// cell, the items that touch the cell. Grid (grid.h) owns the memory and builds the lists on the host.
 #pragma once
 
 #include "pictura/common/math.h"
@@ -11,7 +11,8 @@ struct Aabb2 {
   Vec2 low, high;
 };
 
-/// Items of cell (ix, iy) are items[begin[c]] .. items[begin[c + 1] - 1], c = iy * num_x + ix, in ascending order.
+/// With c = iy * num_x + ix, the items of cell (ix, iy) are items[begin[c]] to items[begin[c + 1] - 1], in ascending
+/// order.
 struct GridView {
   Vec2 origin_m;
   float cell_m = 1;

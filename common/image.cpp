@@ -92,7 +92,7 @@ CameraImages camera_images(const ImageLayout& layout, int camera, void* first) {
   CameraImages images;
   images.width_px = its.size.width_px;
   images.height_px = its.size.height_px;
-  if (first != nullptr) {  // without views there may be no memory
+  if (first != nullptr) {  // null if there are no views
     images.data = static_cast<std::byte*>(first) + its.offset * static_cast<int64_t>(bytes_per_value(layout.format));
   }
   images.view_stride = its.view_stride;
@@ -150,8 +150,8 @@ std::vector<uint8_t> HostImages::interleaved(int view, int camera_index) const {
 
 namespace {
 
-// State that libpng's callbacks can reach. They are C functions: they report errors by longjmp, and exceptions must not
-// pass through them.
+// State that libpng's callbacks can reach. The callbacks are C functions: they report errors by longjmp, and exceptions
+// must not pass through them.
 struct PngOutput {
   std::string bytes, complaint;
 };

@@ -1,5 +1,5 @@
-// Batches of images in memory of the caller (ImageBatch), an owner for the host (HostImages), and image_layout, which
-// alone computes the places of images. Images have no padding.
+// Batches of images. ImageBatch refers to memory of the caller, and HostImages owns host memory. Only image_layout()
+// computes where images are in memory. Images have no padding.
 #pragma once
 
 #include <cstdint>
@@ -26,22 +26,25 @@ struct ImageSize {
   bool operator==(const ImageSize&) const = default;
   int64_t pixels() const { return int64_t{width_px} * height_px; }
 };
-/// Number of values of one image of this size: channels of pixels, including the padding of patches of side `patch_px`.
+/// Number of values (channels of pixels) of one image. If the order is patches, it includes the padding of patches with
+/// side `patch_px`.
 int64_t image_values(ImageSize size, ChannelOrder order, int patch_px = kDefaultPatch_px);
-/// Throws Error if the order is patches and renderers do not write patches of this side. The message begins with the
-/// renderer's name if there is one. Allocates only for the message.
+/// Throws Error if the order is patches and renderers cannot write patches of this side. The message begins with the
+/// renderer's name unless `renderer` is empty. Allocates memory only for the message.
 void check_patch_px(std::string_view renderer, ChannelOrder order, int patch_px);
 
-/// Place of one camera's images in the memory of a layout. Channel c of pixel (x, y) of a view is the value offset +
-/// view * view_stride + c * channel_stride + y * row_stride + x * pixel_stride; all terms count values. In patches it
-/// is offset + view * view_stride + place_in_patches(patch_px, width, c, x, y), and the last three strides are 0.
+/// Place of one camera's images in the memory of an ImageLayout. Offsets and strides count values (channels of pixels).
+/// Channel c of pixel (x, y) of a view is value offset + view * view_stride + c * channel_stride + y * row_stride + x *
+/// pixel_stride. If the order is patches, it is value offset + view * view_stride + place_in_patches(patch_px, width,
+/// c, x, y), and the last three strides are 0.
 struct CameraLayout {
   ImageSize size;
   int block = 0;  // index into ImageLayout::blocks
   int64_t offset = 0;
   int64_t view_stride = 0, camera_stride = 0, channel_stride = 0, row_stride = 0, pixel_stride = 0;
 };
-/// Images of one size: [views, cameras of the block, channels, rows, pixels], or with the channels last.
+/// Block of images of one size, as an array [views, cameras of the block, ...]. The last dimensions are those of the
+/// image's ChannelOrder.
 struct BlockLayout {
   ImageSize size;
   std::vector<int> cameras;  // indices into the rig's cameras, ascending
@@ -49,7 +52,7 @@ struct BlockLayout {
 };
 struct ImageLayout {
   std::vector<CameraLayout> cameras;  // [cameras of the rig]
-  std::vector<BlockLayout> blocks;    // one per distinct size, in the order of first appearance, without gaps
+  std::vector<BlockLayout> blocks;    // one per distinct size, without gaps, in order of first occurrence
   PixelFormat format = PixelFormat::u8;
   ChannelOrder order = ChannelOrder::planar;
   int patch_px = kDefaultPatch_px;  // side of the patches, where the order is patches
@@ -57,14 +60,15 @@ struct ImageLayout {
   std::size_t bytes() const { return static_cast<std::size_t>(num_values) * bytes_per_value(format); }
 };
 
-/// Throws Error unless num_views >= 0 and, if the order is patches, the patches are of 4, 8, 12 or 16 px.
+/// Computes the layout of images. Throws Error if num_views is negative, or if the order is patches and patch_px is not
+/// 4, 8, 12 or 16.
 ImageLayout image_layout(Span<const ImageSize> sizes, int64_t num_views, PixelFormat format,
                          ChannelOrder order = ChannelOrder::planar, int patch_px = kDefaultPatch_px);
-/// Variant for a rig's cameras; also throws the errors of validate(rig).
+/// Computes the layout of the images of a rig. Also throws the errors of validate(rig).
 ImageLayout image_layout(const Rig& rig, int64_t num_views, PixelFormat format,
                          ChannelOrder order = ChannelOrder::planar, int patch_px = kDefaultPatch_px);
 
-/// Memory of one camera's images, without gaps within an image. In planar images, value (view, channel, y, x) is
+/// Memory of one camera's images, without gaps within an image. In planar images, channel `channel` of pixel (x, y) is
 /// element view * view_stride + (channel * height + y) * width + x of `data`. In patches, it is element view *
 /// view_stride + place_in_patches(patch_px, width, channel, x, y).
 struct CameraImages {
@@ -76,11 +80,11 @@ struct CameraImages {
   uint16_t* instance_id = nullptr;  // optional, 1 + index of the agent in its world; 0: none
 };
 
-/// Returns a camera's images in the memory of a whole layout, without planes.
+/// Returns the images of one camera, in memory of a layout that begins at `first`. The optional pointers are null.
 CameraImages camera_images(const ImageLayout& layout, int camera, void* first);
 
-/// Images that render() fills. All renderers draw planar images. Renderers with Renderer::draws_all_formats also draw
-/// patches of 4, 8, 12 or 16 px; other requests are refused.
+/// Images that Renderer::render() fills. All renderers draw planar images. Renderers whose draws_all_formats() is true
+/// also draw patches of 4, 8, 12 or 16 px. Renderers throw Error for other requests.
 struct ImageBatch {
   Device device;  // device of all spans and pointers below
   PixelFormat format = PixelFormat::u8;
@@ -90,21 +94,21 @@ struct ImageBatch {
   int patch_px = kDefaultPatch_px;  // side of the patches, where the order is patches
 };
 
-enum class Planes : uint8_t { none, all };  // depth, class and instance
+enum class Planes : uint8_t { none, all };  // optional outputs of CameraImages: depth, class and instance
 
-/// Host memory for the images of a rig: colour as in image_layout.
+/// Host memory for the images of a rig. image_layout() defines the layout of the colour.
 class HostImages {
  public:
   HostImages(const Rig& rig, int num_views, PixelFormat format = PixelFormat::u8, Planes planes = Planes::none,
              ChannelOrder order = ChannelOrder::planar, int patch_px = kDefaultPatch_px);
-  // A copy's cameras would point into the original's memory.
+  // Not copyable, because a copy's cameras would point into the original's memory.
   HostImages(const HostImages&) = delete;
   HostImages& operator=(const HostImages&) = delete;
   HostImages(HostImages&&) = default;
   HostImages& operator=(HostImages&&) = default;
   ImageBatch batch();
   const ImageLayout& layout() const { return layout_; }
-  /// Bytes of all colour blocks in order: the input of image_hash.
+  /// Bytes of all colour blocks in order.
   Span<const uint8_t> bytes() const { return bytes_; }
   Span<uint8_t> bytes() { return bytes_; }
   const CameraImages& camera(int index) const { return cameras_[index]; }

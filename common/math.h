@@ -1,6 +1,6 @@
-// Small vectors, and transcendental functions that are bit-equal on both devices. libm and CUDA differ in their last
-// bits, so sin, cos, atan and exp are implemented here: single-precision polynomials after S. Moshier's Cephes, using +
-// - * / alone.
+// Small vectors, and transcendental functions that are bitwise equal on host and CUDA devices. The results of libm and
+// CUDA differ in their last bits. So this header implements sin, cos, atan and exp: single-precision polynomials after
+// S. Moshier's Cephes, which use only +, -, * and /.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -59,10 +59,10 @@ struct SinCos {
   float sin, cos;
 };
 
-/// Sine and cosine together, within 2e-7 for |x_rad| <= 1e4; bit-equal on all devices.
+/// Sine and cosine of an angle, with an error below 2e-7 for |x_rad| <= 1e4.
 PICTURA_HD inline SinCos sincos_of(float x_rad) {
   const float quarter_turns = floorf(x_rad * 0.63661977236758134f + 0.5f);
-  // pi/2 in three parts, so that the product with a small integer is exact (Cody and Waite).
+  // pi/2 is split into three parts, so that the products with a small integer are exact (Cody and Waite).
   float r = x_rad - quarter_turns * 1.5703125f;
   r = r - quarter_turns * 4.837512969970703125e-4f;
   r = r - quarter_turns * 7.54978995489188216e-8f;
@@ -85,7 +85,7 @@ PICTURA_HD inline float tan_of(float x_rad) {
   return sc.sin / sc.cos;
 }
 
-/// Arc tangent in (-pi/2, pi/2), within 2e-7.
+/// Arc tangent, in (-pi/2, pi/2), with an error below 2e-7.
 PICTURA_HD inline float atan_of(float x) {
   const float magnitude = fabsf(x);
   float offset = 0.0f;
@@ -112,7 +112,8 @@ PICTURA_HD inline float atan2_of(float y, float x) {
   return y < 0.0f ? angle - kPi : angle + kPi;
 }
 
-/// e^x within a relative error of 2e-7. Below -87 the result is 0, above 88 x is clamped, and NaN gives NaN.
+/// e^x, with a relative error below 2e-7. If x is below -87, the result is 0; if x is above 88, x is clamped to 88. NaN
+/// gives NaN.
 PICTURA_HD inline float exp_of(float x) {
   if (!(x >= -87.0f)) return x < -87.0f ? 0.0f : x;
   x = min_of(x, 88.0f);

@@ -1,4 +1,4 @@
-// Parsing and formatting of a pixel's number of samples.
+// Parsing and formatting of PixelSamples, the number of samples per pixel.
 #pragma once
 
 #include <optional>

@@ -25,8 +25,8 @@ PICTURA_HD inline Philox4 philox4x32_10(Philox4 counter, uint32_t key0, uint32_t
   return counter;
 }
 
-/// Purpose of a random number. Two purposes never share a draw. Append only: seeds identify runs, so the number of a
-/// purpose must not change.
+/// Purpose of a random number. Two purposes never share a draw. Runs are reproduced from their seeds, so the number of
+/// a purpose must not change: new purposes are appended.
 enum class Purpose : uint8_t {
   world_size = 0,
   spawn = 2,
@@ -56,7 +56,8 @@ enum class Purpose : uint8_t {
   impaired_spell,
 };
 
-/// Key of a stream of draws: owner, time and purpose. Ids are global across ranks. Fields that are not given are 0.
+/// Key of a stream of draws: owner, time and purpose. Ids of worlds are unique across the ranks (processes) of a run.
+/// Members that the caller does not set are 0.
 struct RandomKey {
   static constexpr int kAgentBits = 12, kPurposeBits = 8;  // the other fields use all of their bits
   static constexpr uint32_t kMaxAgents = 1u << kAgentBits;

@@ -51,7 +51,7 @@ void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKin
                    std::vector<Strip>* strips_out) {
   PICTURA_CHECK(points_m.size() >= 2, "polyline: expected at least two points, got {}", points_m.size());
 
-  // Points with pieces of at most kMaxPiece_m between them, without repeated points.
+  // The polyline's points without repeated points, and with points added so that no piece is longer than kMaxPiece_m.
   std::vector<Vec3> points{points_m[0]};
   for (std::size_t i = 1; i < points_m.size(); ++i) {
     const Vec3 a = points.back(), b = points_m[i];
@@ -64,8 +64,8 @@ void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKin
   }
   if (points.size() < 2) return;
 
-  // Side vector of a point: the left normal at the ends, and the mitre between its two pieces inside. A closed polyline
-  // is mitred at its seam too.
+  // Side vector of a point: at the ends of the polyline, the left normal; elsewhere, the mitre between the point's two
+  // pieces. A closed polyline is mitred at its first point too.
   const std::size_t last = points.size() - 1;
   const bool closed = last >= 3 && length(points[last] - points[0]) < kRepeatedPoint_m;
   auto piece_left = [&](std::size_t i) { return left_normal(unit(points[i + 1].xy() - points[i].xy())); };

@@ -1,6 +1,6 @@
-// The scene: all data that a simulator and a renderer exchange. StaticGeometry is the drawn part of a map, uploaded
-// once. SceneBatch is everything that moves, written in every step. A View places a rig. The plain data types are in
-// scene_types.h.
+// The scene: all data that a simulator and a renderer exchange. StaticGeometry is the drawn part of a map, which is
+// uploaded once. SceneBatch holds everything that moves or changes, and is written in every step. A View is the pose of
+// a camera rig. The plain data types are in scene_types.h.
 #pragma once
 
 #include <vector>
@@ -23,7 +23,7 @@ struct StaticGeometry {
   StaticGeometryView view() const { return {strips, walls, heads, strip_grid.view(), wall_grid.view(), num_signals}; }
 };
 
-/// A SceneBatch with its memory, on the host.
+/// Owner of a SceneBatch in host memory.
 struct SceneOwner {
   std::vector<int32_t> world_begin{0};
   std::vector<AgentBox> agents;
@@ -43,14 +43,15 @@ struct SceneOwner {
   }
 };
 
-/// Makes a drawn box in the colours of its class; size_m is its length, width and height.
+/// Makes a box that is drawn in the colours of its class. size_m is (length, width, height).
 AgentBox make_box(AgentClass agent_class, Vec3 center_m, float heading_rad, Vec3 size_m);
 
 /// Makes a view at a pose; it hides no agent.
 View make_view(Vec3 origin_m, float heading_rad);
 
-/// Views of a call. If num_views is given, it lies on the device of the views, and only views [0, *num_views) are read.
-/// So a list of views that a device compacted can be drawn without waiting for the host.
+/// Views of one call to a renderer. If num_views is not null, it points to memory on the device of the views, and only
+/// views [0, *num_views) are read. So a list of views that a kernel has compacted can be drawn without copying its
+/// length to the host.
 struct ViewBatch {
   Span<const View> views;
   const int32_t* num_views = nullptr;
@@ -62,9 +63,9 @@ struct ViewBatch {
   std::size_t size() const { return views.size(); }
 };
 
-/// Minimum distance in plan between consecutive points of a polyline; closer points are dropped.
+/// Minimum distance on the ground plane between consecutive points of a polyline; closer points are dropped.
 constexpr float kRepeatedPoint_m = 1e-4f;
-/// Cuts polylines (at least two points each) into mitred strips of at most kMaxPiece_m and appends these strips.
+/// Cuts a polyline of at least two points into mitred strips of at most kMaxPiece_m, and appends the strips.
 void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKind kind, std::vector<Strip>* strips_out);
 
 }  // namespace pictura

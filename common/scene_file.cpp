@@ -71,7 +71,7 @@ std::vector<std::vector<Vec3>> dashes_of(const std::vector<Vec3>& points_m, floa
   return dashes;
 }
 
-// Returns a line parallel to the line of the strips, mitred like them.
+// Returns a line that is parallel to the line of the strips, with the same mitres.
 std::vector<Strip> moved_aside(std::vector<Strip> strips, float left_m) {
   auto move = [&](Vec3* point, Vec2 side) { *point = *point + Vec3{left_m * side.x, left_m * side.y, 0}; };
   for (Strip& strip : strips) {

@@ -1,5 +1,6 @@
 // A scene in one TOML file: boxes, lines, walls, lights, a rig and views. docs/reference/scene_file.md documents every
-// key. `pictura render` and the golden tests draw scene files, and reports of wrong images should contain one.
+// key. `pictura render` and the tests of golden images draw scene files. A report of a wrong image should contain a
+// scene file.
 #pragma once
 
 #include <string>
@@ -16,11 +17,11 @@ struct SceneFile {
   StaticGeometry geometry;
   SceneOwner scene;  // its world's geometry handle is 0
   std::vector<View> views;
-  std::vector<std::string> view_names, view_captions;  // [views]; names can be used as file names
+  std::vector<std::string> view_names, view_captions;  // [views]; each name is a valid file name
 };
 
-/// Parses a scene's text. Paths of rig files are relative to `folder`. Throws Error naming source, line, table and key
-/// for unknown and missing keys, wrong types, numbers out of range and indices of agents that do not exist.
+/// Parses a scene's text. Paths of rig files are relative to `folder`. Throws Error for unknown and missing keys, wrong
+/// types, numbers out of range and indices of agents that do not exist. The message names source, line, table and key.
 SceneFile parse_scene(const std::string& text, const std::string& source, const std::string& folder = ".");
 
 /// Reads a scene file of up to 1 MiB.

@@ -1,5 +1,5 @@
-// The scenes of many steps as one scene. One call redraws the images of any agents at any of these steps: minibatches,
-// films and replays read the history instead of stored images.
+// Storage of the scenes of many steps as one large scene. One call of a renderer can redraw the images of any agents at
+// any of these steps. So training minibatches, films and replays need no stored images.
 #pragma once
 
 #include <memory>
@@ -11,15 +11,15 @@
 
 namespace pictura {
 
-/// Capacity of a history; every step has the same number of each item.
+/// Capacity of a history. Every step has the same numbers of worlds, agents, lights and views.
 struct SceneHistorySize {
   int num_steps = 0;
   std::size_t worlds = 0, agents = 0, lights = 0, views = 0;  // per step
 };
 
-/// History of scenes in the memory of one device. World w of step s is world s * worlds + w of the history, and so on
-/// for agents and lights. The rules of Renderer for devices, streams and waiting apply: put() and gather() neither
-/// allocate nor wait.
+/// History of scenes in the memory of one device. World w of step s is world s * worlds + w of the history; agents and
+/// lights are numbered in the same way. Devices, streams and waiting follow the rules of Renderer (renderer.h): put()
+/// and gather() neither allocate nor wait.
 class SceneHistory {
  public:
   /// Throws Error if the history has more agents or lights than a scene can have.
@@ -31,22 +31,23 @@ class SceneHistory {
   virtual Device device() const = 0;
   const SceneHistorySize& size() const { return size_; }
 
-  /// Stores a scene and the views of its agents at `step`, replacing the step's previous content. Steps must be filled
-  /// in order first. Throws Error if the scene is of another device or size, hides agents, or a step is left out.
+  /// Stores a scene and the views of its agents at `step`, replacing the step's previous content. Steps must first be
+  /// filled in ascending order. Throws Error if the scene is on another device, has other sizes or has hidden agents,
+  /// or if an earlier step was never filled.
   void put(int step, const SceneBatch& scene, Span<const View> views, Stream stream = {});
 
   /// Returns the scene of all steps that have been put.
   virtual SceneBatch scene() const = 0;
 
-  /// Copies views in scene(), by rows step * size().views + view. A row of a step that has not been put, or of a view
-  /// that renderers would refuse in its own step, gives a view that renderers refuse. Throws Error unless there are as
-  /// many rows as views_out.
+  /// Copies stored views, with their indices shifted to those of scene(). Row step * size().views + view selects one
+  /// view of one step. If that step has not been put, or if the view's world or ego was out of range in its step, the
+  /// copy is a view that renderers refuse. Throws Error unless there are as many rows as views_out.
   void gather(Span<const int64_t> rows, Span<View> views_out, Stream stream = {}) const;
 
  protected:
   /// Number of steps that have been put.
   int num_steps() const { return num_steps_; }
-  /// Row mapping of gather(), for views in the order of put().
+  /// Returns gather()'s mapping from rows to views. `views` holds the stored views, [steps, views per step].
   HistoryViews history_views(const View* views) const {
     return {views, static_cast<int64_t>(size_.views), num_steps_, static_cast<int32_t>(size_.worlds),
             static_cast<int32_t>(size_.agents)};
@@ -60,7 +61,7 @@ class SceneHistory {
   int num_steps_ = 0;
 };
 
-/// Memory of a history, for both devices: Buffer<T>(n) holds n elements at data().
+/// Memory of a history on host or device. Buffer<T>(n) is a buffer of n elements that begins at data().
 template <template <typename...> class Buffer>
 struct SceneHistoryArrays {
   SceneHistorySize size;
@@ -91,7 +92,8 @@ struct SceneHistoryArrays {
             {}};
   }
 
-  /// Writes a step: copy(from, first) copies elements, and shift(from, added, first) adds a number to each element.
+  /// Writes a step. copy(from, to) copies the elements of `from` to the address `to`; shift(from, added, to) also adds
+  /// `added` to each element.
   template <typename Copy, typename Shift>
   void write_step(int step, const SceneBatch& scene, Span<const View> step_views, Copy&& copy, Shift&& shift) {
     const std::size_t worlds = count(step, size.worlds);

@@ -1,5 +1,6 @@
-// Plain data of scenes, readable on both devices: the pieces of a map, moving objects, and the views from which images
-// are drawn. Right-handed, in metres, z up; headings in radians, counter-clockwise.
+// Plain data of scenes for host and CUDA code: the drawn parts of a map, moving objects, and the views from which
+// images are drawn. World coordinates are right-handed, in metres, with z up. Headings are counter-clockwise, in
+// radians.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -9,13 +10,13 @@
 
 namespace pictura {
 
-/// Kind of a strip on the road; its class in the optional class plane is kClassOfStrip + kind.
+/// Kind of a strip of road paint. Its value in the optional CameraImages::class_id is kClassOfStrip + kind.
 enum class StripKind : uint8_t { lane_mark, road_edge, crosswalk, stop_line };
 constexpr int kNumStripKinds = 4;
 
-/// One straight piece, at most kMaxPiece_m long, of a polyline painted on the road. Its corners are a -+ side_a * w/2
-/// and b -+ side_b * w/2: the sides are mitred, so that consecutive pieces share an edge without overlap or gap.
-/// Aligned for devices, which read 16 bytes at once.
+/// One straight piece, at most kMaxPiece_m long, of a polyline painted on the road. Its corners are a_m +- side_a *
+/// width_m / 2 and b_m +- side_b * width_m / 2. The ends are mitred, so that consecutive pieces share an edge without
+/// overlap or gap. Aligned, because a CUDA thread loads 16 bytes in one instruction.
 struct alignas(16) Strip {
   Vec3 a_m, b_m;        // the two ends of the centre line
   Vec2 side_a, side_b;  // horizontal offset to the left per metre of half-width, at a and at b
@@ -25,24 +26,25 @@ struct alignas(16) Strip {
 };
 constexpr float kMaxPiece_m = 10.0f;
 
-/// An opaque vertical face from the ground up, seen from both sides.
+/// An opaque vertical face that begins on the ground and is visible from both sides.
 struct alignas(8) WallFace {
   Vec3 a_m, b_m;  // the two ends of its lower edge
   float height_m = 0;
   Rgb color = kWallColor;
 };
 
-/// A disk of kLightRadius_m in the colour of its signal's state, drawn for cameras in front of it.
+/// Head of a traffic light: a disk of radius kLightRadius_m in the colour of its signal's state. Only cameras in front
+/// of the disk see it.
 struct LightHead {
   Vec3 position_m;  // centre of the disk
   Vec2 facing;      // unit vector, towards the traffic that the light controls
   float cos_half_angle = 0.5f;
-  int32_t signal = 0;  // index into the world's light states: the stop line that the light governs
+  int32_t signal = 0;  // index of the light's stop line among the world's light states
 };
 constexpr float kLightRadius_m = 0.5f;
 
-/// Box by which the uniform grids store a piece. For a strip, it bounds the four corners, which lie up to four
-/// half-widths from the centre line where the strip is mitred.
+/// Bounding box on the ground plane, by which the uniform grids store a strip or wall. The mitred corners of a strip
+/// are up to four half-widths from its centre line.
 PICTURA_HD inline Aabb2 ground_box(const Strip& strip) {
   const Vec2 a = strip.a_m.xy(), b = strip.b_m.xy();
   const Vec2 at_a = strip.side_a * (0.5f * strip.width_m), at_b = strip.side_b * (0.5f * strip.width_m);
@@ -54,7 +56,7 @@ PICTURA_HD inline Aabb2 ground_box(const WallFace& wall) {
           {max_of(wall.a_m.x, wall.b_m.x), max_of(wall.a_m.y, wall.b_m.y)}};
 }
 
-/// View of a StaticGeometry that both devices read.
+/// Non-owning view of a StaticGeometry for host and CUDA code.
 struct StaticGeometryView {
   Span<const Strip> strips;
   Span<const WallFace> walls;
@@ -69,12 +71,12 @@ struct AgentBox {
   float cos_heading = 1, sin_heading = 0;
   float length_m = 0, width_m = 0, height_m = 0;
   AgentClass agent_class = AgentClass::vehicle;
-  uint8_t palette = 0;  // 0: class colours; 1: halted, 2: parked, with the debug palette alone
+  uint8_t palette = 0;  // 0: class colours; 1 (halted) and 2 (parked): tinted if debug_palette is on
   uint8_t drawn = 1;    // 0: absent from all images
   uint8_t padding = 0;
 };
 
-/// Handle of a StaticGeometry in renderers; the caller of upload() chooses it, in [0, kNumGeometryHandles).
+/// Handle of a StaticGeometry in renderers. The caller of Renderer::upload() chooses it in [0, kNumGeometryHandles).
 using GeometryHandle = int32_t;
 constexpr GeometryHandle kNumGeometryHandles = 1 << 16;
 
@@ -89,36 +91,37 @@ struct SceneBatch {
   Span<const GeometryHandle> geometry;  // [worlds]
   Span<const int32_t> light_begin;      // [worlds + 1] first light state of each world
   Span<const LightState> light_states;  // [light_begin.back()]
-  Span<const int32_t> hidden_agents;    // lists that views refer to; usually empty
+  Span<const int32_t> hidden_agents;    // lists of agents that views leave out; usually empty
 };
 
-/// Whether a world has a light state for each of its map's signals, or no light state, in which case no light is drawn.
+/// Whether a world has a light state for each signal of its map, or no light states at all. Without light states, no
+/// light is drawn.
 PICTURA_HD constexpr bool has_enough_lights(int32_t lights, int32_t signals) {
   return lights == 0 || lights >= signals;
 }
 
-/// Objects that a view leaves out of its images, as bits.
+/// Bits for the objects that a view leaves out of its images.
 enum Hides : uint32_t {
   kHidesNothing = 0,
   kHidesAgents = 1,  // all agents
   kHidesLights = 2,  // all traffic lights
 };
 
-/// Key of the randomization of a view's cameras (common/raster/randomize_camera.h), like the keys of random numbers
-/// (common/rng.h). An image that is drawn again with the same key has the same bits.
+/// Key of the random numbers that randomize a view's cameras (common/raster/randomize_camera.h). The members have the
+/// meaning of those of RandomKey (common/rng.h). An image that is drawn again with the same key has the same bits.
 struct ViewKey {
-  uint32_t world = 0;  // global
+  uint32_t world = 0;  // global id
   uint32_t agent = 0;  // index in its world, below RandomKey::kMaxAgents
   uint32_t episode = 0, step = 0;
 };
 
-/// The pose of a rig. The ego's own box is left out of its images.
+/// Pose of a camera rig in a world. The images omit the box of the ego, the agent that carries the rig.
 struct View {
   int32_t world = 0;
-  int32_t ego_agent = -1;  // index into SceneBatch::agents, or -1: no agent is left out
+  int32_t ego_agent = -1;  // index into SceneBatch::agents; -1: no agent is omitted
   Vec3 origin_m;           // the rig's origin, on the ground
   float cos_heading = 1, sin_heading = 0;
-  float body_length_m = kRigBodyLength_m;    // shrinks the x offsets of the cameras of short bodies
+  float body_length_m = kRigBodyLength_m;    // below kRigBodyLength_m, the cameras' x offsets shrink
   int32_t hidden_begin = 0, hidden_end = 0;  // further hidden agents: a range of SceneBatch::hidden_agents
   uint32_t hides = kHidesNothing;            // bits of Hides
   ViewKey key;

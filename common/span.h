@@ -1,5 +1,5 @@
-// A pointer and a length that both devices can hold, without ownership. Converts from std::vector and from Span<T> to
-// Span<const T>. Lengths and indices may be of any integer type: counts are int in most of the code, and need no casts.
+// Non-owning pointer and length, for host and CUDA code. A std::vector converts to a Span, and a Span<T> converts to a
+// Span<const T>. Lengths and indices may have any integer type, so that code that counts in int needs no casts.
 #pragma once
 
 #include "pictura/common/portable/hd.h"

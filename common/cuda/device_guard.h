@@ -1,4 +1,5 @@
-// The current CUDA device of a thread. Objects that live on one device set it in each call, so that callers need not.
+// The current CUDA device of a thread. Objects with memory on one device set the current device in each call, so that
+// callers need not.
 #pragma once
 
 #include <cuda_runtime_api.h>

@@ -57,8 +57,8 @@ class DeviceScene {
   DeviceUpload<LightState> light_states_;
 };
 
-/// Device memory for images whose destination is on the host: colour as in image_layout, and the planes that the host
-/// images have.
+/// Device memory for images that are then copied to the host. image_layout() defines the layout of the colour. The
+/// optional planes (depth, class, instance) are those that the host images have.
 class DeviceImages {
  public:
   /// Allocates, on the current device, images of the same sizes, format and planes as `host`.
@@ -86,7 +86,7 @@ class DeviceImages {
   /// All colour bytes of the images that like() allocated.
   Span<uint8_t> color_bytes() const { return color_bytes_; }
 
-  /// Copies the images, which like() allocated, into host images of at most as many views, on the stream.
+  /// Copies the images that like() allocated to host images, on the stream. The host images must not have more views.
   void copy_to_host(const ImageBatch& host, cudaStream_t stream = nullptr) const {
     const auto views = static_cast<std::size_t>(host.num_views);
     auto copy = [&](void* to, const void* from, std::size_t bytes) {

@@ -1,4 +1,5 @@
-// DLPack's numbers of streams, and dependencies between streams.
+// Conversion between streams and the numbers by which DLPack (a standard for exchanging tensors) identifies them, and
+// dependencies between streams.
 #pragma once
 
 #include <cstdint>
@@ -7,8 +8,8 @@
 
 namespace pictura {
 
-/// Returns the stream of a DLPack number: 1 is the legacy default stream, 2 the per-thread default stream, others are
-/// handles.
+/// Returns the stream of a DLPack number: 1 is the legacy default stream, 2 is the per-thread default stream, and any
+/// other number is a handle.
 inline Stream stream_of_number(int64_t number) {
   if (number == 1) return {cudaStreamLegacy};
   if (number == 2) return {cudaStreamPerThread};
@@ -29,7 +30,7 @@ inline void order_streams(Device device, Stream before, Stream after) {
   const cudaError_t recorded = cudaEventRecord(event, static_cast<cudaStream_t>(before.handle));
   const cudaError_t waits =
       recorded == cudaSuccess ? cudaStreamWaitEvent(static_cast<cudaStream_t>(after.handle), event, 0) : recorded;
-  cudaEventDestroy(event);  // deferred by CUDA until the event has completed
+  cudaEventDestroy(event);  // CUDA destroys the event only after it has completed
   PICTURA_CUDA(waits);
 }
 

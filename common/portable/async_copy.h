@@ -24,8 +24,8 @@ PICTURA_HD inline void wait_for_copies() {
 #endif
 }
 
-/// Prefetches the memory at `first` + offset_bytes, which need not be allocated: into the L2 cache of a device, or the
-/// first-level cache of a core.
+/// Prefetches the memory at `first` + offset_bytes into the L2 cache of a CUDA device or the L1 cache of a host core.
+/// The address need not be allocated.
 PICTURA_HD inline void prefetch(const void* first, int offset_bytes = 0) {
   // Added as integers, because a pointer sum must stay within an array.
   const uintptr_t address = reinterpret_cast<uintptr_t>(first) + static_cast<uintptr_t>(offset_bytes);
@@ -33,12 +33,12 @@ PICTURA_HD inline void prefetch(const void* first, int offset_bytes = 0) {
   asm volatile("prefetch.global.L2 [%0];" : : "l"(address));
 #else
   __builtin_prefetch(reinterpret_cast<const void*>(address));
-  asm volatile("");  // otherwise g++ treats functions that only prefetch as free of effects, and drops their calls
+  asm volatile("");  // otherwise g++ considers a function that only prefetches to have no effect, and drops its calls
 #endif
 }
 
 /// Waits until the previous launch on the stream has ended and its writes are visible. With programmatic dependent
-/// launch, a kernel may start before that.
+/// launch, a kernel may start before the previous launch has ended.
 PICTURA_HD inline void wait_for_earlier_launch() {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
   asm volatile("griddepcontrol.wait;" : : : "memory");

@@ -10,8 +10,8 @@
 
 namespace pictura {
 
-// Two types rather than one, since a program may contain code with and without AVX2: their memory layouts are equal,
-// but their calling conventions differ.
+// Two types, because a program may contain code with and without AVX2. The memory layouts of both types are equal, but
+// their calling conventions differ.
 #if defined(__AVX2__) && !defined(__CUDACC__)
 inline namespace float8_in_a_register {
 
@@ -27,7 +27,7 @@ inline Float8 set8(float a, float b, float c, float d, float e, float f, float g
 }
 inline Float8 load8(const float* from) { return {_mm256_loadu_ps(from)}; }
 inline void store8(const Float8& a, float* to) { _mm256_storeu_ps(to, a.value); }
-/// Loads integers as floats, which must be able to hold them exactly.
+/// Loads integers as floats. A float must represent each integer exactly.
 inline Float8 load8_integers(const int32_t* from) {
   return {_mm256_cvtepi32_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)))};
 }
@@ -51,7 +51,7 @@ inline Float8 keep_bits(const Float8& a, uint32_t bits) {
   return {_mm256_and_ps(a.value, _mm256_castsi256_ps(_mm256_set1_epi32(static_cast<int32_t>(bits))))};
 }
 
-/// A mask: all bits or none, for each element.
+/// A mask: in each element, either all bits are set or none.
 struct Mask8 {
   __m256 bits;
 };
@@ -61,7 +61,7 @@ inline Mask8 operator^(const Mask8& a, const Mask8& b) { return {_mm256_xor_ps(a
 inline Mask8 operator~(const Mask8& a) { return {_mm256_xor_ps(a.bits, _mm256_castsi256_ps(_mm256_set1_epi32(-1)))}; }
 inline Mask8 operator<(const Float8& a, const Float8& b) { return {_mm256_cmp_ps(a.value, b.value, _CMP_LT_OQ)}; }
 inline Mask8 operator<=(const Float8& a, const Float8& b) { return {_mm256_cmp_ps(a.value, b.value, _CMP_LE_OQ)}; }
-/// Compares elements as the unsigned integers of the same bits.
+/// Compares elements as unsigned integers with the same bits.
 inline Mask8 less_bits(const Float8& a, const Float8& b) {
   const __m256i lowest = _mm256_set1_epi32(INT32_MIN);
   const __m256i of_a = _mm256_xor_si256(_mm256_castps_si256(a.value), lowest);
@@ -71,9 +71,9 @@ inline Mask8 less_bits(const Float8& a, const Float8& b) {
 inline Mask8 equal_bits(const Float8& a, const Float8& b) {
   return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_castps_si256(a.value), _mm256_castps_si256(b.value)))};
 }
-/// Mask as an integer: bit k is set where element k is.
+/// Returns a mask as an integer: bit k is set if element k is set.
 inline uint32_t bits_of(const Mask8& mask) { return static_cast<uint32_t>(_mm256_movemask_ps(mask.bits)); }
-/// Returns the elements of a where the mask is set, else of b.
+/// Returns element k of a if element k of the mask is set, else element k of b.
 inline Float8 select(const Mask8& mask, const Float8& a, const Float8& b) {
   return {_mm256_blendv_ps(b.value, a.value, mask.bits)};
 }
@@ -81,19 +81,19 @@ inline Float8 select(const Mask8& mask, const Float8& a, const Float8& b) {
 /// Exchanges elements 2k and 2k + 1.
 inline Float8 swap_pairs(const Float8& a) { return {_mm256_permute_ps(a.value, 0xB1)}; }
 
-/// Returns element k of b where bit k of the mask is set, else of a.
+/// Returns element k of b if bit k of kMask is set, else element k of a.
 template <int kMask>
 inline Float8 blend(const Float8& a, const Float8& b) {
   return {_mm256_blend_ps(a.value, b.value, kMask)};
 }
 
-/// Returns the elements at the given places.
+/// Returns elements k0 to k7 of a.
 template <int k0, int k1, int k2, int k3, int k4, int k5, int k6, int k7>
 inline Float8 permute(const Float8& a) {
   return {_mm256_permutevar8x32_ps(a.value, _mm256_setr_epi32(k0, k1, k2, k3, k4, k5, k6, k7))};
 }
 
-/// Loads eight consecutive pairs: their first elements and their second elements.
+/// Loads eight consecutive pairs, and separates their first elements from their second elements.
 inline void load_pairs(const float* from, Float8* first_out, Float8* second_out) {
   const __m256 a = _mm256_loadu_ps(from), b = _mm256_loadu_ps(from + 8);
   const __m256 low = _mm256_permute2f128_ps(a, b, 0x20), high = _mm256_permute2f128_ps(a, b, 0x31);
@@ -110,7 +110,7 @@ inline void gather_pairs(const float* from, const int32_t* indices, Float8* firs
   first_out->value = _mm256_shuffle_ps(low, high, 0x88);
   second_out->value = _mm256_shuffle_ps(low, high, 0xDD);
 }
-/// Loads four unaligned floats at from(k) for each element k: four_out[j] holds the j-th floats.
+/// Loads four unaligned floats at from(k) for each element k: four_out[j] holds the j-th float of each element.
 template <typename From>
 inline void gather_fours(From&& from, Float8* four_out) {
   // The floats of elements k and k + 4 occupy the halves of one register.
@@ -127,7 +127,7 @@ inline void gather_fours(From&& from, Float8* four_out) {
   four_out[3].value = _mm256_shuffle_ps(high_01, high_23, 0xEE);
 }
 
-/// Places of the set bits of every byte, in ascending order.
+/// For each value of a byte, the places of its set bits in ascending order.
 struct SetBits {
   alignas(8) uint8_t places[256][8];
   constexpr SetBits() : places{} {
@@ -145,26 +145,26 @@ inline __m256i set_bits(uint32_t mask) {
   return _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(kSetBits.places[mask])));
 }
 
-/// Copies the 32-bit elements whose bits are set in the mask. Up to eight elements of `to` are overwritten.
+/// Copies the 32-bit elements whose bits are set in the mask, without gaps. May overwrite eight elements of `to`.
 template <typename Word>
 inline void copy_chosen(const Word* from, uint32_t mask, Word* to) {
   static_assert(sizeof(Word) == sizeof(int32_t));
   const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(all, set_bits(mask)));
 }
-/// Writes the integers first + k for each set bit k of the mask. Up to eight elements of `to` are overwritten.
+/// Writes the integer first + k for each set bit k of the mask, without gaps. May overwrite eight elements of `to`.
 inline void store_chosen(int32_t first, uint32_t mask, int32_t* to) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_add_epi32(set_bits(mask), _mm256_set1_epi32(first)));
 }
-/// Bit k of the result: whether integer k equals the value.
+/// Returns a bit mask: bit k is set if integer k equals the value.
 inline uint32_t equal8(const int32_t* integers, int32_t value) {
   const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(integers));
   const __m256i equal = _mm256_cmpeq_epi32(all, _mm256_set1_epi32(value));
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(equal)));
 }
 
-/// The smallest 64-bit keys inserted so far, four for each of kFours, in ascending order. Each key is in [0,
-/// 0x7FF0...0), where integers are ordered as the doubles with the same bits.
+/// The 4 * kFours smallest 64-bit keys inserted so far, in ascending order. Keys must be in [0, 0x7FF0...0), where
+/// integers have the same order as the doubles with the same bits.
 template <int kFours>
 struct SmallestKeys {
   static constexpr int kCount = 4 * kFours;
@@ -177,7 +177,7 @@ struct SmallestKeys {
   /// Inserts a key and drops the largest, which may be the new key.
   void insert(int64_t key) {
     const __m256d all_new = _mm256_castsi256_pd(_mm256_set1_epi64x(key));
-    __m256d carried = _mm256_setzero_pd();  // the element before each four
+    __m256d carried = _mm256_setzero_pd();  // the element before the current four
     for (__m256d& four : keys) {
       const __m256d rotated = _mm256_permute4x64_pd(four, 0x93);
       // An element that is larger than the new key becomes the larger of its predecessor and the new key.
@@ -264,7 +264,7 @@ PICTURA_HD inline Float8 keep_bits(const Float8& a, uint32_t bits) {
 struct alignas(32) Mask8 {
   int32_t bits[8];
 };
-/// Returns a mask that is set at k where is(k).
+/// Returns a mask whose element k is set if is(k) is true.
 template <typename Is>
 PICTURA_HD inline Mask8 make_mask8(Is&& is) {
   Mask8 mask;
@@ -378,8 +378,8 @@ PICTURA_HD inline Mask8 operator>=(const Float8& a, const Float8& b) { return b 
 PICTURA_HD inline Float8 reciprocal_in_range(const Float8& a) { return 1.0f / a; }
 PICTURA_HD inline Float8 saturate(const Float8& a) { return min_no_nan(max_no_nan(a, 0.0f), 1.0f); }
 
-/// Bits of the first or last `count` of eight elements, where groups of eight overlap or are padded. first_lanes_mask()
-/// takes any count: above 8, all bits; below 0, none.
+/// Bit masks of the first or last `count` of eight elements, for groups of eight that overlap or are padded.
+/// first_lanes_mask() accepts any count: above 8, all bits are set; below 0, none.
 PICTURA_HD constexpr uint32_t first_lanes_mask(int count) {
   return count >= 8 ? 0xFFu : count <= 0 ? 0u : (1u << count) - 1;
 }

@@ -1,6 +1,6 @@
-// PICTURA_HD marks a function that runs on host and device. This header also defines fixed-width integers and C maths
-// for every shared header, including under NVRTC, which has no standard library. Compiler-dependent code belongs in
-// this folder.
+// PICTURA_HD marks a function that runs on host and device. This header also provides fixed-width integers and C math
+// functions to all headers of host and CUDA code, including code compiled by NVRTC, which has no standard library.
+// Compiler-dependent code belongs in this folder.
 #pragma once
 
 #if defined(__CUDACC__)

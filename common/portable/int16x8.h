@@ -1,4 +1,4 @@
-// SIMD on eight 16-bit integers: one instruction on a host, four on a device.
+// SIMD on eight 16-bit integers: an operation is one instruction on a host and four on a CUDA device.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -12,8 +12,8 @@ using Int16Vector = int16_t __attribute__((vector_size(16)));
 using Uint16Vector = uint16_t __attribute__((vector_size(16)));
 #endif
 
-/// Eight 16-bit integers. On a device, a word holds elements k and k + 4 as halves, for instructions on pairs. On a
-/// host, the elements are contiguous in one register.
+/// Eight 16-bit integers. On a device, word k holds elements k and k + 4 as its lower and upper half, because
+/// instructions operate on pairs. On a host, the elements are contiguous in one register.
 struct Int16x8 {
 #if defined(__CUDA_ARCH__)
   uint32_t halves[4];
@@ -23,7 +23,7 @@ struct Int16x8 {
 };
 constexpr int kInt16x8Size = 8, kInt16x8Half = 4;
 
-/// Returns the elements of(0) to of(7).
+/// Returns a vector of the elements of(0) to of(7).
 template <typename Of>
 PICTURA_HD inline Int16x8 make_int16x8(Of&& of) {
   Int16x8 result;
@@ -37,7 +37,8 @@ PICTURA_HD inline Int16x8 make_int16x8(Of&& of) {
   return result;
 }
 
-/// Element k is base + (k - 4) * step, which must be in [0, 65,536); its 16 bits are stored.
+/// Returns a vector whose element k is base + (k - 4) * step. This number must be in [0, 65,536); its 16 bits are
+/// stored.
 PICTURA_HD inline Int16x8 arithmetic_sequence(int32_t step, int32_t base) {
 #if defined(__CUDA_ARCH__)
   Int16x8 result;
@@ -105,8 +106,8 @@ PICTURA_HD inline Int16x8 add_clamp(const Int16x8& a, const Int16x8& b, const In
 }
 
 #if defined(__CUDA_ARCH__)
-/// Looks up four bytes of `table` by four selectors of four bits. A selector above 7 gives the sign of byte (selector -
-/// 8), replicated over 8 bits (unlike __byte_perm).
+/// Looks up four bytes of `table` by four selectors of four bits. A selector above 7 gives the sign bit of byte
+/// (selector - 8), replicated over 8 bits (unlike __byte_perm).
 __device__ inline uint32_t bytes_of(uint64_t table, uint32_t selectors) {
   uint32_t bytes;
   asm("prmt.b32 %0, %1, %2, %3;"
@@ -122,12 +123,12 @@ __device__ inline uint32_t selectors_of(const Int16x8& a) {
 }
 #endif
 
-/// A bit mask per element: in byte k, the bits from (from[k] / 128) up to but excluding (to[k] / 128) are set. Requires
-/// 0 <= from[k] <= to[k] <= 8 * 128.
+/// Returns a bit mask per element: in byte k, the bits from (from[k] / 128) up to but excluding (to[k] / 128) are set.
+/// Requires 0 <= from[k] <= to[k] <= 8 * 128.
 PICTURA_HD inline uint64_t bits_between(const Int16x8& from, const Int16x8& to) {
 #if defined(__CUDA_ARCH__)
-  // Byte i of the table is the mask of the bits from i on, with its upper four bits XORed with its lower four. So byte
-  // 0 has no sign bit, and selector 8 gives 0.
+  // Byte i of the table is the mask of bits i to 7, with its upper four bits XORed with its lower four. So byte 0 has
+  // no sign bit, and selector 8 gives 0.
   constexpr uint64_t kTable = 0x80C0E0F0783C1E0Full;
   constexpr uint32_t kUpperFour = 0xF0F0F0F0u;
   const uint32_t begin = selectors_of(from), end = selectors_of(to);
@@ -140,7 +141,7 @@ PICTURA_HD inline uint64_t bits_between(const Int16x8& from, const Int16x8& to) 
   const Uint32Vector one{1, 1, 1, 1, 1, 1, 1, 1};
   const Uint32Vector bits = (one << __builtin_convertvector(to.value >> 7, Uint32Vector)) -
                             (one << __builtin_convertvector(from.value >> 7, Uint32Vector));
-  // Converted through 16 bits, for which instructions exist.
+  // Converted from 32 to 16 to 8 bits, because instructions exist for these two steps.
   const auto bytes = __builtin_convertvector(__builtin_convertvector(bits, Uint16Vector), Bytes);
   return __builtin_bit_cast(uint64_t, bytes);
 #endif

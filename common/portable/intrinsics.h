@@ -1,4 +1,4 @@
-// Scalar operations that take one or few instructions on a device. Results are bit-equal on both devices.
+// Scalar operations that take one or few instructions on a CUDA device. Results on host and device are bitwise equal.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -6,7 +6,7 @@
 namespace pictura {
 
 /// 1 / x and the square root of x, correctly rounded (IEEE 754), for |x| in [2^-100, 2^100]. The device code is the
-/// compiler's own for that range, without the range test.
+/// code that the CUDA compiler generates for that range, without its test of the range.
 PICTURA_HD inline float reciprocal_in_range(float x) {
 #if defined(__CUDA_ARCH__)
   float guess;
@@ -38,14 +38,14 @@ PICTURA_HD inline float float_from_bits(uint32_t bits) {
 #endif
 }
 
-/// Minimum and maximum, one instruction on either device. Arguments must not be NaN: if one is NaN, a device returns
-/// the other argument and a host returns b. Of +0 and -0, either may be returned.
+/// Minimum and maximum: one instruction on a device or a host. Arguments must not be NaN: if one is NaN, a device
+/// returns the other argument and a host returns b. If the arguments are +0 and -0, either may be returned.
 PICTURA_HD inline float min_no_nan(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return fminf(a, b);
 #elif defined(__AVX__)
-  // Inline assembly, because g++ 12 compiles a conditional expression with a constant b to a branch, which a pixel's
-  // edges mispredict.
+  // Inline assembly, because g++ 12 compiles a conditional expression with a constant b to a branch. Processors often
+  // mispredict that branch for the edges of a pixel.
   float minimum;
   asm("vminss %2, %1, %0" : "=x"(minimum) : "x"(a), "xm"(b));
   return minimum;
@@ -83,7 +83,8 @@ PICTURA_HD inline uint32_t bits_from_float(float x) {
 #endif
 }
 
-/// Returns x as a value that the device compiler cannot recompute; otherwise it moves cheap computations into loops.
+/// Returns x, and prevents the CUDA compiler from computing x again. Otherwise the compiler moves cheap computations
+/// into loops.
 PICTURA_HD inline float no_rematerialize(float x) {
 #if defined(__CUDA_ARCH__)
   asm volatile("" : "+f"(x));

@@ -1,5 +1,5 @@
 // Cameras of the rasterizers: pose, projection and frustum. Camera coordinates are (right, down, forward) in metres;
-// the third is the depth. Shared by both devices.
+// the third coordinate is the depth. Shared by host and CUDA code.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -25,8 +25,8 @@ struct PinholeCamera {
   int32_t width_px = 0, height_px = 0;
 };
 
-/// Returns a rig's camera in the world, for a view. For bodies shorter than the rig's reference length, the x offset
-/// shrinks in proportion.
+/// Places a rig's camera in the world, at the pose of a view. For bodies shorter than View::kRigBodyLength_m, the x
+/// offset shrinks in proportion to the body's length.
 PICTURA_HD inline PinholeCamera place_camera(const PinholeCamera& in_ego, const View& view) {
   const float shrink = min_of(1.0f, view.body_length_m / View::kRigBodyLength_m);
   const float c = view.cos_heading, s = view.sin_heading;
@@ -72,7 +72,7 @@ PICTURA_HD inline Frustum make_frustum(const PinholeCamera& camera) {
 /// Returns false if a sphere (camera coordinates) is entirely outside the frustum or beyond the visible range, where
 /// all faces have faded to black.
 PICTURA_HD inline bool sphere_in_frustum(const Frustum& f, Vec3 center, float radius_m) {
-  // No short circuits: lanes of a warp would diverge.
+  // No short circuits, because lanes of a warp would diverge.
   const bool in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < kVisibleRange_m);
   const bool in_width = ((center.x - f.x_low * center.z) * f.x_low_scale > -radius_m) &
                         ((f.x_high * center.z - center.x) * f.x_high_scale > -radius_m);
@@ -88,7 +88,7 @@ PICTURA_HD inline Vec3 far_corner(const PinholeCamera& camera, const Frustum& f,
   return camera.position_m + (camera.right * x + camera.down * y + camera.forward) * kVisibleRange_m;
 }
 
-/// Bounding box on the ground of the frustum within the visible range.
+/// Bounding box, on the ground plane, of the part of the frustum within the visible range.
 PICTURA_HD inline Aabb2 frustum_ground_box(const PinholeCamera& camera, const Frustum& f) {
   Aabb2 box{camera.position_m.xy(), camera.position_m.xy()};
   for (int corner = 0; corner < 4; ++corner) {
@@ -99,8 +99,8 @@ PICTURA_HD inline Aabb2 frustum_ground_box(const PinholeCamera& camera, const Fr
   return box;
 }
 
-/// Bounding box on the ground of the centres of all spheres up to this radius that sphere_in_frustum() passes. At a
-/// given depth, the centres lie in the frustum's rectangle, widened on all sides.
+/// Bounding box, on the ground plane, of the centres of all spheres of at most this radius for which
+/// sphere_in_frustum() is true. At each depth, the centres are in the frustum's cross-section, widened on all sides.
 PICTURA_HD inline Aabb2 ground_box_of_spheres(const PinholeCamera& camera, const Frustum& f, float radius_m) {
   const float leeway_m = 0.01f * radius_m + 0.1f;  // exceeds the rounding errors of coordinate sums
   const float reach_m = radius_m + leeway_m;
@@ -128,8 +128,8 @@ PICTURA_HD inline CellRange cells_of(const GridView& grid, const Aabb2& box) {
   return {grid.cell_x(box.low.x), grid.cell_x(box.high.x) + 1, grid.cell_y(box.low.y), grid.cell_y(box.high.y) + 1};
 }
 
-/// Returns true only in the first cell of the query that contains the item, so that an item in several cells is visited
-/// once.
+/// Whether (cell_x, cell_y) is the first cell of the query that contains the item. An item in several cells is visited
+/// only in its first cell.
 PICTURA_HD inline bool is_first_visit(const GridView& grid, const CellRange& query, const Aabb2& item_box, int cell_x,
                                       int cell_y) {
   return cell_x == max_of(grid.cell_x(item_box.low.x), query.x_begin) &&

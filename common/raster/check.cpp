@@ -18,7 +18,7 @@ void check_color(std::string_view renderer, std::string_view piece, std::size_t 
                 renderer, piece, i, color.r, color.g, color.b);
 }
 
-// Checks that a grid contains all pieces: grids are built from the pieces that a geometry has at that time.
+// Checks that a grid contains all pieces, because a geometry may get more pieces after its grid was built.
 void check_grid(std::string_view renderer, std::string_view pieces, std::size_t count, const Grid& grid) {
   PICTURA_CHECK(grid.num_boxes() == count,
                 "renderer {}: geometry: expected grids built from all {} {}, got a grid of {}: call build_grids() last",

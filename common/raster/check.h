@@ -1,4 +1,4 @@
-// Checks of every renderer before it draws: of the images to fill, and of scenes on the host.
+// Checks that every renderer makes before it draws: of the images to fill, and of scenes in host memory.
 #pragma once
 
 #include <string_view>
@@ -10,20 +10,20 @@
 
 namespace pictura {
 
-/// Throws Error unless `what` ("scene" or "images") lies on the renderer's device.
+/// Throws Error unless both devices are equal. In the message, `what` is "scene" or "images".
 void check_device(std::string_view renderer, std::string_view what, Device expected, Device device);
 
 /// Throws Error unless the images lie on the renderer's device, fit its rig and the number of views, and have an order
 /// and a format that the renderer draws.
 void check_images(const Renderer& renderer, std::size_t num_views, const ImageBatch& images);
 
-/// Throws Error unless the rig is valid, the line floor within the guard band and the randomization within
-/// kMaxCameraRandomization; returns the configuration.
+/// Returns the configuration. Throws Error unless the rig is valid, the line floor is at most kMaxLineFloor_px, and the
+/// randomization is within kMaxCameraRandomization.
 const RendererConfig& check_config(std::string_view renderer, const RendererConfig& config);
 
-/// Throws Error unless all spans of a host scene fit together and handles refer to uploaded geometries. Lights must
-/// suffice for their signals, worlds must be within the size limit, hidden agents must exist, and every agent's box
-/// must be finite.
+/// Throws Error unless all spans of a host scene have consistent lengths and all handles refer to uploaded geometries.
+/// Each world must have enough lights (has_enough_lights()) and at most kMaxBoxesPerWorld agents. Hidden agents must
+/// exist, and every agent's box must be finite.
 void check_scene(std::string_view renderer, const SceneBatch& scene, const HostGeometries& geometries);
 
 /// Throws Error unless each view's world, ego and range of hidden agents exist in a host scene that check_scene
@@ -36,8 +36,8 @@ Span<const View> counted_views(std::string_view renderer, const ViewBatch& views
 /// Throws Error unless the number of answers equals the number of visibility queries.
 void check_answers(std::string_view renderer, std::size_t num_queries, std::size_t num_answers);
 
-/// Throws Error unless each query's view is below max_views and there are as many answers as queries. If the view is
-/// one of `views`, which check_views accepted, the query's agent must be of that view's world.
+/// Throws Error unless each query's view is below max_views and there are as many answers as queries. If the query's
+/// view is one of `views`, which check_views() accepted, the query's agent must be in the world of that view.
 void check_queries(std::string_view renderer, const SceneBatch& scene, Span<const View> views, std::size_t max_views,
                    Span<const VisibilityQuery> queries, std::size_t num_answers);
 
@@ -47,11 +47,11 @@ void check_handle(std::string_view renderer, GeometryHandle handle);
 /// Throws Error unless both sizes of Renderer::reserve are non-negative.
 void check_reserved(std::string_view renderer, int max_views, int max_boxes);
 
-/// Throws Error unless each piece is finite, has non-negative sizes, colours in [0, 1] and an existing signal, and the
-/// grids hold all pieces.
+/// Throws Error unless each strip, wall and light head is finite and has non-negative sizes, colours in [0, 1] and an
+/// existing signal. The grids must contain all strips and walls.
 void check_geometry(std::string_view renderer, const StaticGeometry& geometry);
 
-/// The rig's cameras as the rasterizers use them, in the ego frame.
+/// Converts a rig's cameras to the form that rasterizers use, in the ego frame.
 std::vector<PinholeCamera> pinhole_cameras(const Rig& rig);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Clips faces in camera coordinates to the near plane and the guard band. Shared by both devices.
+// Clips faces in camera coordinates to the near plane and the guard band. Shared by host and CUDA code.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -10,8 +10,9 @@ namespace pictura {
 /// Clipping by five planes adds at most one corner per plane; one further corner is for a cut in progress.
 constexpr int kMaxPolygonCorners = kMaxFaceCorners + 6;
 
-/// One of the five planes of the frustum. inside() is a distance in the plane's own unit, negative outside.
-/// Coefficients instead of branches let lanes of a warp use different planes: terms of other planes are 0.
+/// One of the five planes of the frustum: the near plane and four sides. inside() is a distance from the plane in a
+/// unit that depends on the plane, negative outside. Each plane has coefficients for all terms, so that lanes of a warp
+/// can use different planes without branches.
 constexpr int kClipPlanes = 5;
 class ClipPlane {
  public:
@@ -30,7 +31,7 @@ class ClipPlane {
   float x_, y_, z_, offset_;
 };
 
-/// Bit mask of the planes that have a point on their outer side.
+/// Bit mask of the planes for which a point is on the outer side.
 PICTURA_HD inline unsigned planes_outside(const Frustum& f, Vec3 p) {
   unsigned outside = 0;
   for (int plane = 0; plane < kClipPlanes; ++plane) {
@@ -54,8 +55,8 @@ PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Corners& corne
   return outside_of_all != 0 ? kOutside : outside_of_any;
 }
 
-/// Intersection of the side from a to b with a plane, given their inside distances. Computed from the inner corner in
-/// both directions, so that faces with a common edge get the same point.
+/// Intersection of the side from a to b with a plane, given inside() of a and of b. It is computed from the inner
+/// corner in both directions, so that two faces with a common side get the same point.
 PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_inside) {
   const bool a_is_inner = a_inside >= 0.0f;
   const Vec3 inner = a_is_inner ? a : b, outer = a_is_inner ? b : a;
@@ -65,10 +66,10 @@ PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_insid
 
 /// Maximum number of corners that widen_in_front() emits.
 constexpr int kMaxWidenedCorners = 5;
-/// Widens a strip in camera coordinates to floor_px on screen. A strip that crosses the near plane is first cut there,
-/// so that its sides run from the near plane to the widened end: a side that moved as a whole would be far from the
-/// strip near the camera. Calls emit(i, corner) for i = 0, 1, ... and returns their number; corners of other faces
-/// (floor_px of 0) are emitted unchanged.
+/// Widens a strip in camera coordinates to at least floor_px on screen. If the strip crosses the near plane, it is cut
+/// there, and only its far end is widened: if its sides moved as a whole, they would be far from the strip near the
+/// camera. Calls emit(i, corner) for i = 0, 1, ... and returns the number of corners. For other faces, floor_px is 0
+/// and the corners do not change.
 template <typename Emit>
 PICTURA_HD inline int widen_in_front(const PinholeCamera& camera, float floor_px, const Vec3* corners, Emit&& emit) {
   Vec3 widened[4];
@@ -102,7 +103,7 @@ PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count
     for (int i = 0; i < count; ++i) polygon_out[i] = corners[i];
     return count;
   }
-  // The buffers alternate so that the last plane writes to polygon_out.
+  // `buffer` and polygon_out alternate as outputs, so that the last plane writes to polygon_out.
   PICTURA_NO_UNROLL
   for (int number = 0; number < kClipPlanes; ++number) {
     if (!((crossed >> number) & 1u)) continue;

@@ -1,5 +1,6 @@
-// Compositing: the weights of a pixel's fragments in its colour, given their visible samples; and conversion of colours
-// to the image's formats. Shared by both devices.
+// Compositing: the weight of each fragment of a pixel in the pixel's colour, computed from the fragment's visible
+// samples. A fragment is the part of a pixel that one face covers. Also converts colours to the formats of images.
+// Shared by host and CUDA code.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -7,24 +8,24 @@
 
 namespace pictura {
 
-/// Accumulator of a pixel's fragments. Sums are of integers, so that they do not depend on the order of the fragments.
+/// Accumulator of a pixel's fragments. It sums integers, so that the sums do not depend on the order of the fragments.
 class PixelAccumulator {
  public:
-  /// kWhole: entirely visible, weighted by its exact area. kPartial: partly occluded, weighted by its area times the
-  /// visible fraction of its samples. kRemainder: covers the whole pixel. Such fragments share the area that other
-  /// fragments leave, in proportion to their visible samples.
+  /// Kind of a fragment. kWhole: entirely visible, weighted by its exact area. kPartial: partly occluded, weighted by
+  /// its area times the visible fraction of its samples. kRemainder: covers the whole pixel. Fragments of kind
+  /// kRemainder share the area that the other fragments leave, in proportion to their visible samples.
   enum Kind : uint8_t { kWhole, kPartial, kRemainder, kNumKinds };
   struct Weight {
     float area = 0;
     Kind kind = kWhole;
   };
-  /// Factors on the weights of each kind, known after all fragments have been added.
+  /// One factor per kind, by which weights are multiplied. The factors are known after all fragments have been added.
   struct Shares {
     float of_kind[kNumKinds] = {1.0f, 1.0f, 1.0f};
     PICTURA_HD float of(Weight weight) const { return weight.area * of_kind[weight.kind]; }
   };
 
-  /// Weight of a fragment. `visible`: its effective samples that no other fragment occludes.
+  /// Weight of a fragment. `visible` are the fragment's effective samples that no other fragment occludes.
   PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, uint64_t visible) {
     const uint64_t samples = effective_samples(coverage);
     const float share = static_cast<float>(popcount(visible)) / static_cast<float>(popcount(samples));
@@ -33,7 +34,7 @@ class PixelAccumulator {
     return {coverage.area * share, kPartial};
   }
 
-  /// A weight, and the colour times the weight, as integers. Parts of one kind can be summed in any order.
+  /// A fragment's weight, and its colour times the weight, as integers. Parts of one kind can be summed in any order.
   struct Part {
     int32_t area = 0, r = 0, g = 0, b = 0;
   };
@@ -61,7 +62,7 @@ class PixelAccumulator {
     if (whole > 1.0f) shares.of_kind[kWhole] = 1.0f / whole;
     if (partial > for_partial) shares.of_kind[kPartial] = for_partial / partial;
     const float remainder = area_of(kRemainder), left = max_of(for_partial - partial, 0.0f);
-    // Less than 1 where other fragments hide some of the remainder's samples (divide_remainder).
+    // `remainder` is less than 1 if other fragments hide some of its samples (divide_remainder).
     shares.of_kind[kRemainder] = remainder > 0.0f && remainder < 1.0f ? left / remainder : left;
     return shares;
   }
@@ -79,18 +80,17 @@ class PixelAccumulator {
   }
 
  private:
-  static constexpr float kUnits = 1 << 20;  // per pixel and channel value of 1; a thousand fragments do not overflow
+  static constexpr float kUnits = 1 << 20;  // units of the value 1; sums of a thousand fragments do not overflow
   PICTURA_HD static int32_t to_units(float value) { return static_cast<int32_t>(value * kUnits + 0.5f); }
   PICTURA_HD float area_of(Kind kind) const { return static_cast<float>(part_[kind].area) * (1.0f / kUnits); }
 
   Part part_[kNumKinds];
 };
 
-/// Divides the remainder of a pixel among the fragments that cover the pixel fully, by each fragment's remaining
-/// samples. If no such fragment has remaining samples, the remainder is divided as if there were no other fragments.
-/// for_each(visit) calls visit(coverage, &visible) for each fragment, where `visible` are the samples that occlude_pair
-/// left of it. For fully covering fragments, this function removes the samples that other fragments hide. With fewer
-/// than two such fragments, nothing changes.
+/// Divides the remainder of a pixel among its full fragments, those that cover the whole pixel. for_each(visit) calls
+/// visit(coverage, &visible) for each fragment; `visible` are the fragment's samples that occlude_pair() left visible.
+/// From the visible samples of full fragments, this function removes those that the other fragments hide. It changes
+/// nothing if fewer than two fragments are full, or if no full fragment would keep a sample.
 template <typename ForEach>
 PICTURA_HD inline void divide_remainder(ForEach&& for_each) {
   uint64_t hidden = 0, left = 0;
@@ -121,7 +121,7 @@ PICTURA_HD inline uint16_t to_half(float channel) {
 
 /// Converts a channel to an unsigned byte.
 PICTURA_HD inline uint8_t to_byte(float channel) { return static_cast<uint8_t>(saturate(channel) * 255.0f + 0.5f); }
-/// Converts a byte's value to a bfloat16, which holds it exactly.
+/// Converts a byte's value to a bfloat16, which represents it exactly.
 PICTURA_HD inline uint16_t bf16_of_byte(uint8_t byte) {
   return static_cast<uint16_t>(bits_from_float(static_cast<float>(byte)) >> 16);
 }
@@ -135,8 +135,8 @@ PICTURA_HD inline Rgb rgb_of_bytes(uint32_t bytes) {
   return rgb8(byte(0), byte(1), byte(2));
 }
 
-/// The visible weight of an agent in an image: sums over its fragments, as integers, so that they do not depend on the
-/// order of the fragments.
+/// Visible weight of an agent in an image, summed over the agent's fragments. The sums are integers, so that they do
+/// not depend on the order of the fragments.
 struct VisibilitySum {
   int64_t among_all = 0, alone = 0;
 

@@ -1,5 +1,5 @@
-// Coverage of a pixel by a convex polygon: the exact area and a mask of 64 samples. Shared by both devices, whose
-// results are bit-equal.
+// Coverage of a pixel by a convex polygon: the exact area and a mask of 64 samples. Shared by host and CUDA code; the
+// results of both are bitwise equal.
 #pragma once
 
 #include "pictura/common/portable/int16x8.h"
@@ -16,8 +16,9 @@ PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x
   return true;
 }
 
-/// Sample mask of a pixel: 8 columns of 8 rows. Each column is shifted down by its own fraction of a row, which gives
-/// 64 distinct heights, since road scenes have many nearly level edges. Sample (column, row) is bit 8 * column + row.
+/// Sample mask of a pixel: 8 columns of 8 rows. Each column is shifted down by a different fraction of a row, so that
+/// all 64 samples have different heights, because road scenes have many nearly level edges. Sample (column, row) is bit
+/// 8 * column + row.
 constexpr uint64_t kAllSamples = ~uint64_t{0};
 /// Offset of a column's first sample from the pixel's top, in rows.
 PICTURA_HD constexpr float sample_column_offset(int column) {
@@ -33,15 +34,16 @@ struct PixelCoverage {
   PICTURA_HD bool is_full() const { return area == 1.0f && samples == kAllSamples; }
 };
 
-/// Samples of a coverage. A sliver, which touches no sample, counts as covering all samples, so that it meets every
-/// other fragment.
+/// Samples of a coverage. A sliver (a polygon that covers an area but no sample) counts as covering all samples, so
+/// that it overlaps every other polygon.
 PICTURA_HD inline uint64_t effective_samples(const PixelCoverage& coverage) {
   return coverage.samples != 0 ? coverage.samples : kAllSamples;
 }
 
-/// Tolerance of full coverage: all samples and an area above 1 - kFullCoverage count as full.
+/// Tolerance of full coverage: a pixel is fully covered if all samples are covered and the area is above 1 -
+/// kFullCoverage.
 constexpr float kFullCoverage = 1e-3f;
-/// Coverage of an area summed over a polygon's edges.
+/// Makes a coverage from samples and from an area that was summed over a polygon's edges.
 PICTURA_HD inline PixelCoverage rounded_coverage(float area, uint64_t samples) {
   if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
   return {min_of(area, 1.0f), samples};
@@ -51,13 +53,14 @@ PICTURA_HD inline PixelCoverage rounded_coverage(float area, uint64_t samples) {
 struct EdgeCrossing {
   float left = 0, right = 0;
 };
-/// Crossing of an edge and a pixel. left_px and top_px: the pixel's corner relative to the edge's upper end.
+/// Crossing of an edge's line and a pixel. (left_px, top_px) is the pixel's top left corner relative to the edge's
+/// upper end.
 PICTURA_HD inline EdgeCrossing edge_crossing(const PolygonEdge& edge, float left_px, float top_px) {
   const float left = left_px * edge.dy_dx - top_px;
   return {left, left + edge.dy_dx};
 }
 
-/// For each column of samples, the range of heights (see kRowUnits) inside all edges so far.
+/// For each column of samples, the range of heights (in units of kRowUnits per row) that is inside all edges so far.
 struct SampleRange {
   Int16x8 low, high;
 };
@@ -66,10 +69,11 @@ PICTURA_HD inline SampleRange whole_range() {
   return {make_int16x8([](int) { return -kFar_units; }), make_int16x8([](int) { return kFar_units; })};
 }
 
-/// Offset that moves a height, as a fraction of kLines_rows, to the lowest bits of a float's mantissa.
+/// Summand that moves a height, given as a fraction of kLines_rows, to the lowest bits of a float's mantissa.
 constexpr float kToLowestBits = 1 << 8;  // the sum's lowest mantissa bit is 1 / (kLines_rows * kRowUnits)
-/// Numbers that, added to an edge's height in the first column right of the pixel's centre, give its height in each
-/// column. They also subtract 2^14, the height of the pixel's centre in the lowest bits, so that the centre is at 0.
+/// For each column, the difference between an edge's height in that column and its height in the first column right of
+/// the pixel's centre. The differences also include -2^14, because the pixel's centre has height 2^14 in the lowest
+/// bits and must be at 0.
 PICTURA_HD inline Int16x8 column_heights(const PolygonEdge& edge) {
   return arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
 }
@@ -85,7 +89,8 @@ PICTURA_HD inline void narrow(const PolygonEdge& edge, const EdgeCrossing& cross
   range_inout->high = add_min(columns, is_below ? kHighest : height, range_inout->high);
 }
 
-/// Offset for each column that turns a height into the number of samples above it, as whole rows.
+/// Offset for each column. A height plus its column's offset, rounded down to whole rows, is the number of samples
+/// above that height.
 PICTURA_HD inline Int16x8 offsets_from_top() {
   return make_int16x8([](int column) {
     return kSampleRows / 2 * kRowUnits + kRowUnits - 1 -
@@ -100,30 +105,32 @@ PICTURA_HD inline uint64_t samples_within(const SampleRange& range) {
   return bits_between(add_clamp(range.low, from_top, to), to);
 }
 
-/// Mask of the samples on the inner side of an edge; left_px and top_px: the pixel's corner relative to the edge's
-/// upper end.
+/// Mask of the samples on the inner side of an edge. (left_px, top_px) is the pixel's top left corner relative to the
+/// edge's upper end.
 PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px, float top_px) {
   SampleRange range = whole_range();
   narrow(edge, edge_crossing(edge, left_px, top_px), &range);
   return samples_within(range);
 }
 
-/// Contribution of an edge to a polygon's area in a pixel. A right border adds the area to its left within the rows
-/// that it spans; a left border subtracts it. Both omit a term that cancels in the sum over a closed polygon.
+/// Contribution of an edge to a polygon's area in a pixel. An edge on the polygon's right adds the area to the edge's
+/// left, within the rows that the edge spans. An edge on the polygon's left subtracts that area. Both omit a term that
+/// cancels in the sum over a closed polygon.
 PICTURA_HD inline float area_of(const PolygonEdge& edge, const EdgeCrossing& crossing, float y_px) {
   const float from = saturate(edge.y0 - y_px), to = saturate(edge.y1 - y_px);
-  // Heights between which the edge is within the pixel's width; beyond the second, the pixel's whole width is to the
-  // left of the edge.
+  // Between the heights `left` and `right`, the edge is within the pixel's width. Beyond `right`, the pixel's whole
+  // width is to the left of the edge.
   const float left = max_no_nan(min_no_nan(crossing.left, to), from);
   const float right = max_no_nan(min_no_nan(crossing.right, to), from);
-  // Mean width of the part to the left of the edge, as a share of the pixel: the line's x midway between both heights.
+  // Mean width of the area to the left of the edge, as a share of the pixel's width. It is the line's x midway between
+  // both heights.
   const float width = saturate(((left + right) - (crossing.left + crossing.right)) * edge.half_dx_dy + 0.5f);
   const float area = (right - left) * width + ((edge.dy_dx > 0.0f ? to : from) - right);
   return edge.rows_scale > 0.0f ? area : -area;
 }
 
-/// Area of a convex polygon in pixel (x, y), and the samples that it covers; nothing below min_area. Edges that do not
-/// cross the pixel keep all samples and add their part of the area, so that no edge needs a special case.
+/// Coverage of pixel (x, y) by a convex polygon; empty if the area is below min_area. Edges that do not cross the pixel
+/// keep all samples and add their part of the area, so that they need no special case.
 PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, float min_area, int x, int y) {
   const float x_px = no_rematerialize(static_cast<float>(x)), y_px = no_rematerialize(static_cast<float>(y));
   float area = 0.0f;
@@ -137,12 +144,12 @@ PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int cou
   return rounded_coverage(area, samples_within(range));
 }
 
-/// Pixels of row y that a polygon may touch, and the range of them that it covers fully.
+/// Range of the pixels of a row that a polygon may touch, and range of the pixels that the polygon covers fully.
 struct RowSpan {
   int32_t begin = 0, end = 0, full_begin = 0, full_end = 0;
 };
 
-/// Margin of spans: the exact tests of pixel_coverage decide at the borders.
+/// Margin at the borders of spans, where the exact tests of pixel_coverage() decide.
 constexpr float kSpanLeeway_px = 1e-3f;
 
 PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const PixelBox& box, int y) {
@@ -159,7 +166,8 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
       if (inner_px < 0.0f) full_high = -1.0f;
       return;
     }
-    // The x at which the edge's line crosses the row's centre, and its half-range in x within the row.
+    // `middle` is the x at which the edge's line crosses the row's centre; `reach` is half of the line's range of x
+    // within the row.
     const float twice_above_px = 2.0f * (middle_px - edge.y0), middle = edge.x0 + twice_above_px * edge.half_dx_dy;
     const float reach = fabsf(edge.half_dx_dy), low = middle - reach, high = middle + reach;
     if (side < 0.0f) {

@@ -1,5 +1,6 @@
-// Culling. An image may show primitives that touch the camera's frustum within the visible range, except for agents
-// that the view excludes. The uniform grids find these primitives. Shared by both devices.
+// Culling: selection of the primitives that an image may show. These touch the camera's frustum within the visible
+// range, and are not agents that the view excludes. The uniform grids find strips and walls. Shared by host and CUDA
+// code.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -24,7 +25,7 @@ PICTURA_HD inline float wall_radius_m(const WallFace& wall) {
   return 0.5f * (length(wall.b_m - wall.a_m) + wall.height_m);
 }
 
-/// Slightly more than the radius of the disk, because a polygon of the disk's area is drawn.
+/// Slightly more than the radius of the disk, because the disk is drawn as a polygon of equal area.
 constexpr float kHeadRadius_m = 1.1f * kLightRadius_m;
 
 PICTURA_HD inline Vec3 box_middle(const AgentBox& box) { return box.center_m + Vec3{0.0f, 0.0f, 0.5f * box.height_m}; }
@@ -59,8 +60,8 @@ PICTURA_HD inline bool is_excluded(const View& view, Span<const int32_t> hidden_
   return false;
 }
 
-/// Calls visit(item) once for each item of a grid in the cells that a box on the ground touches. box_of(item) must be
-/// the box by which the item was put into the grid.
+/// Calls visit(item) once for each item in those cells of a grid that a box on the ground touches. box_of(item) must be
+/// the box with which the grid was built.
 template <typename BoxOf, typename Visit>
 PICTURA_HD inline void for_each_item(const GridView& grid, const Aabb2& query_box, BoxOf&& box_of, Visit&& visit) {
   const CellRange cells = cells_of(grid, query_box);

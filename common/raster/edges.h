@@ -1,4 +1,4 @@
-// Edges of convex polygons on screen, precomputed for coverage. Shared by both devices.
+// Edges of convex polygons on screen, precomputed for coverage. Shared by host and CUDA code.
 #pragma once
 
 #include "pictura/common/math.h"
@@ -7,22 +7,22 @@
 
 namespace pictura {
 
-/// An edge of a polygon on screen. Apart from two signs, its values do not depend on its direction in the face: faces
-/// that share an edge split areas and samples between them exactly.
+/// An edge of a polygon on screen. Apart from two signs, its members do not depend on the edge's direction. So two
+/// faces that share an edge split areas and samples exactly.
 struct alignas(16) PolygonEdge {
   float x0 = 0, y0 = 0;  // the upper end
   float half_dx_dy = 0;  // slope of its line; 0 for level edges
-  // Together with rows_offset and rows_step, maps the line to sample heights (see make_edge); negative if the face is
-  // above the edge. row_span reads only the members up to rows_scale.
+  // Maps the line to sample heights, together with rows_offset and rows_step (see make_edge). Negative if the face is
+  // above the edge. row_span() reads only the members up to this member.
   float rows_scale = 0;
-  float y1 = 0;     // the lower end's y; y0 for level edges, which bound no area
+  float y1 = 0;     // the lower end's y; equal to y0 for level edges, which bound no area
   float dy_dx = 0;  // slope of its line; 0 for level edges
   float rows_offset = 0;
   int32_t rows_step = 0;
 };
 
-/// Calls visit(edge) for the edges of a polygon; each edge is loaded while the previous edge is visited. Two
-/// alternating variables avoid moves.
+/// Calls visit(edge) for the edges of a polygon. Each edge is loaded while the previous edge is visited, into two
+/// variables alternately, which avoids moves.
 template <typename Visit>
 PICTURA_HD inline void for_each_edge(const PolygonEdge* edges, int count, Visit&& visit) {
   PolygonEdge even = edges[0], odd;
@@ -37,16 +37,16 @@ PICTURA_HD inline void for_each_edge(const PolygonEdge* edges, int count, Visit&
   }
 }
 
-/// Edges whose ends are closer in y than kLevel_px are level and bound no area. Edges whose ends are closer in x than
-/// kUpright_px are made to lean by that much to the right.
+/// Edges whose ends differ by less than kLevel_px in y are level and bound no area. Edges whose ends differ by less
+/// than kUpright_px in x are changed so that x differs by kUpright_px.
 constexpr float kLevel_px = 1e-6f, kUpright_px = 1e-6f;
 /// Columns and rows of a pixel's sample grid.
 constexpr int kSampleColumns = kInt16x8Size, kSampleRows = 8;
 /// Sample tests use heights as 16-bit integers, kRowUnits per row, relative to the pixel's centre. In the first column
-/// right of the centre, a line's height is clamped to half of kLines_rows; it changes by at most kSteepest rows per
-/// column. So the line has left the pixel before it is clamped, and 16 bits do not overflow. Steeper lines are turned
-/// about the pixel's centre to kSteepest, so that they cross a column over some 8 rows. An upright line would take all
-/// samples of a column at once, which would quantize areas to eighths of the pixel.
+/// right of the centre, a line's height is clamped to +-kLines_rows / 2; per column, it changes by at most kSteepest
+/// rows. So the line has left the pixel before it is clamped, and 16 bits do not overflow. The slopes of steeper lines
+/// are reduced to kSteepest, so that they cross a column over some 8 rows. An upright line would otherwise include all
+/// samples of a column or none, which would quantize areas to eighths of the pixel.
 constexpr int kRowUnits = 128;
 constexpr float kLines_rows = 256.0f, kSteepest = 9.0f;
 
@@ -62,13 +62,13 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   edge.y1 = is_level ? upper.y : lower.y;
   edge.dy_dx = dy * reciprocal_in_range(dx);
   edge.half_dx_dy = 0.5f * dx_dy;
-  // For steeper lines, one factor scales down all heights relative to the pixel's centre: the line still crosses the
-  // centre's height at the same place.
+  // For lines steeper than kSteepest, one factor scales down all heights relative to the pixel's centre. The line still
+  // crosses the height of the centre at the same x.
   const float shrink = is_level ? 1.0f : min_of(kSteepest * fabsf(dx_dy), 1.0f);
   const float scale = shrink * (0.5f * kSampleRows / kLines_rows), step_rows = shrink * edge.dy_dx;
-  // Maps a sum of heights to the height in the first column right of the centre, as a fraction of kLines_rows; 0.5 is
-  // the pixel's centre. The summands are the heights at which the line crosses the pixel's left and right sides, in
-  // pixels from its top.
+  // rows_scale and rows_offset map the sum of two heights to the height in the first column right of the centre, as a
+  // fraction of kLines_rows; 0.5 is the pixel's centre. The line crosses the pixel's left and right sides at these two
+  // heights, in pixels from the pixel's top.
   edge.rows_scale = (dx > 0.0f) == downward ? scale : -scale;
   edge.rows_offset = 0.5f - scale + step_rows * (0.5f / kLines_rows);
   edge.rows_step = static_cast<int32_t>(floorf(step_rows * kRowUnits + 0.5f));
@@ -78,14 +78,14 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
 /// Positive if the face is to the left of an edge, negative if it is to the right, 0 for level edges.
 PICTURA_HD inline float side_of(const PolygonEdge& edge) { return edge.rows_scale * edge.half_dx_dy; }
 
-/// Whether a point is on an edge's line or on its inner side.
+/// Whether a point is on an edge's line or on the inner side of the line.
 PICTURA_HD inline bool is_inside(const PolygonEdge& edge, Vec2 p) {
   const float below_px = (p.y - edge.y0) - (p.x - edge.x0) * edge.dy_dx;
   return (edge.rows_scale > 0.0f ? below_px : -below_px) >= 0.0f;
 }
 
-/// Calls store_edge(i, edge), i = 0, 1, ..., for the edges of a polygon on screen, skipping edges of length 0. Returns
-/// the number of edges, at most `count`.
+/// Calls store_edge(i, edge) with i = 0, 1, ... for the edges of a polygon on screen, except for edges of length 0.
+/// Returns the number of edges, at most `count`.
 template <typename StoreEdge>
 PICTURA_HD inline int make_edges(const Vec2* corner, int count, bool is_clockwise, StoreEdge&& store_edge) {
   int edges = 0;

@@ -1,5 +1,5 @@
-// Face set-up: from a primitive to its faces on screen. Shared by both devices, which differ only in the distribution
-// of the work and the storage of the results.
+// Face set-up: conversion of a primitive to its faces on screen. Shared by host and CUDA code, which distribute the
+// work and store the results differently.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -44,9 +44,9 @@ PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
   return static_cast<uint16_t>(kind_of(face.object_id) == kAgentKind ? 1 + index_of(face.object_id) : 0);
 }
 
-/// Minimum coverage of a pixel: smaller coverages and smaller faces are ignored. Strips occlude hardly anything except
-/// each other, so their minimum is higher: an area that adds less than kMinWeight to every channel is ignored. It is at
-/// most an eighth of a pixel, because dark strips may occlude bright strips.
+/// Minimum covered area of a pixel: smaller areas and smaller faces are ignored. Strips rarely occlude anything except
+/// each other, so their minimum is higher: an area that adds less than kMinWeight to every channel is ignored. The
+/// minimum of a strip is at most kMaxSparedArea, because dark strips may occlude bright strips.
 constexpr float kMinArea = 1e-4f, kMinWeight = 2.0f / 255.0f, kMaxSparedArea = 0.125f;
 PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
   if (kind_of(primitive.object_id) != kStripKind) return kMinArea;
@@ -58,14 +58,14 @@ PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
 PICTURA_HD inline bool is_quad_visible(const ImageSetting& setting, const ScreenQuad& quad, const FacePlane& plane,
                                        Rgb color, PrimitiveRef primitive, bool* is_clockwise_out) {
   ScreenBounds bounds = quad.bounds;
-  if (kind_of(primitive.object_id) == kStripKind && plane.offset > 0.0f) {  // seen from below
+  if (kind_of(primitive.object_id) == kStripKind && plane.offset > 0.0f) {  // the strip is seen from below
     bounds.inverse_depth_high *= nearest_standing(plane_distance_m(plane));
   }
   return find_winding(quad, 2.0f * min_area_of(color, primitive), is_clockwise_out) &&
          !setting.occluders.occludes(setting.camera, bounds);
 }
 
-/// Completes a face of make_screen_face or make_quad_face with the members that depend on its primitive.
+/// Completes a face of make_screen_face() or make_quad_face(): sets the members that depend on its primitive.
 PICTURA_HD inline ScreenFace complete_face(const ScreenFace& face, PrimitiveRef primitive, int32_t edge_begin) {
   ScreenFace whole = face;
   if (kind_of(primitive.object_id) == kStripKind) {
@@ -84,8 +84,9 @@ PICTURA_HD inline ScreenFace complete_face(const ScreenFace& face, PrimitiveRef 
   return whole;
 }
 
-/// Clips and projects a face. Its edges go to a pool: take(count) returns the index of the first, or -1 if the pool is
-/// full, and put(index, edge) stores one edge. Returns false if no part of the face is in the image.
+/// Clips and projects a face, and stores its edges in a pool. pool.take(count) reserves edges and returns the index of
+/// the first edge, or -1 if the pool is full; pool.put(index, edge) stores an edge. Returns false if no part of the
+/// face is in the image or the pool is full.
 template <typename EdgePool>
 PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primitive, const CameraFace& face,
                                  EdgePool& pool, ScreenFace* face_out) {
@@ -121,9 +122,10 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
   return true;
 }
 
-/// The front surface at a screen point. Faces that cover the point are added in any order; front() returns the face
-/// in front of all others, or null. Among equally near solids, and among strips on the level of the nearest strip, the
-/// lowest object id wins. is_in_front() orders the remaining solid and strip.
+/// The front surface at a screen point. Faces that cover the point are added in any order; front() returns the face in
+/// front of all others, or null. Among equally near solids (faces that are not strips), and among strips on the level
+/// of the nearest strip, the face with the lowest object id is in front. is_in_front() compares the remaining solid
+/// with the remaining strip.
 class FrontFace {
  public:
   PICTURA_HD void add(const ScreenFace& face, Vec2 at_px) {

@@ -1,4 +1,4 @@
-// Host copies of maps' geometries for a renderer, by the handles that its caller chose.
+// Host copies of the geometries of maps for a renderer, by handle.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// Map from handles to geometries. Callers check handles first (check_handle).
+/// Map from handles to geometries. Callers must first check handles with check_handle().
 class HostGeometries {
  public:
   /// Copies a geometry, replacing the handle's previous geometry.

@@ -1,5 +1,5 @@
-// From a face in camera coordinates to a polygon on screen: projection, bounds, and the inverse depth of its plane.
-// Shared by both devices.
+// Conversion of a face in camera coordinates to a polygon on screen: projection, bounds, and the inverse depth of its
+// plane. Shared by host and CUDA code.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -20,7 +20,7 @@ struct PixelBox {
   int16_t x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
 };
 
-/// A convex polygon on screen; its edges are stored in a pool. Members in the order of access.
+/// A convex polygon on screen, whose edges are stored in a pool. The members are in the order in which they are read.
 struct alignas(16) ScreenFace {
   PixelBox box;
   int32_t edge_begin = 0;
@@ -29,13 +29,13 @@ struct alignas(16) ScreenFace {
   uint16_t min_area_units = 0;  // see min_area()
   // Inverse depth at screen point (x, y): inverse_depth_x * x + inverse_depth_y * y + inverse_depth_0.
   float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
-  uint32_t object_id = 0;  // id of its primitive, see common/raster/visibility.h
-  // Range of the inverse depth over the face's corners; for strips, widened by kWidenedDepth.
+  uint32_t object_id = 0;  // id of the face's primitive, see common/raster/visibility.h
+  // Range of the inverse depth over the face's corners, widened by kWidenedDepth if the face is a strip.
   float inverse_depth_low = 0, inverse_depth_high = 0;
   float nearest_standing = 1;  // see nearest_standing(); 1 except for strips that are seen from below
-  float plane_distance_m = 0;  // strips: height of their plane above the camera, along its normal; solids: 0
+  float plane_distance_m = 0;  // strips: height of the strip's plane above the camera, along the normal; other faces: 0
   Rgb color;
-  uint32_t color_bytes = 0;  // to_bytes(color), used by devices
+  uint32_t color_bytes = 0;  // to_bytes(color), for CUDA code
 
   /// Coverages of a pixel below this area are ignored, see min_area_of.
   PICTURA_HD float min_area() const { return static_cast<float>(min_area_units) * (1.0f / kAreaUnits); }
@@ -56,7 +56,7 @@ struct ScreenBounds {
     inverse_depth_low = min_no_nan(inverse_depth_low, inverse_depth);
     inverse_depth_high = max_no_nan(inverse_depth_high, inverse_depth);
   }
-  /// Whether the bounds are within an image enlarged by a margin.
+  /// Whether the bounds are within the image enlarged by a margin.
   PICTURA_HD bool are_within(const PinholeCamera& camera, float margin_px) const {
     return low.x >= -margin_px && low.y >= -margin_px && high.x <= static_cast<float>(camera.width_px) + margin_px &&
            high.y <= static_cast<float>(camera.height_px) + margin_px;
@@ -74,7 +74,7 @@ struct ScreenBounds {
   }
 };
 
-/// The pixels that a polygon may touch; its bounds must meet the image and be within the guard band.
+/// The pixels that a polygon may touch. The polygon's bounds must overlap the image and be within the guard band.
 PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, const ScreenBounds& bounds) {
   auto pixel_of = [](float at) { return static_cast<int>(floorf(at)); };
   return {static_cast<int16_t>(max_of(pixel_of(bounds.low.x), 0)),
@@ -83,29 +83,29 @@ PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, const ScreenBo
           static_cast<int16_t>(min_of(pixel_of(bounds.high.y) + 1, camera.height_px))};
 }
 
-/// Polygons of less than half of this area are dropped.
+/// Polygons whose area is less than half of this are dropped.
 constexpr float kMinTwiceArea_px2 = 1e-6f;
 
-/// Whether a plane has an inverse depth. Planes of faces without area and planes through the camera have none.
+/// Whether a plane has an inverse depth. The plane of a face without area, and a plane through the camera, have none.
 PICTURA_HD inline bool has_inverse_depth(const FacePlane& plane) {
   constexpr float kMinMagnitude = 1e-30f;
   return dot(plane.normal, plane.normal) > kMinMagnitude && fabsf(plane.offset) > kMinMagnitude;
 }
-/// Inverse depth of a plane as a linear function of the screen: factors of x and y, and a constant. On the plane,
-/// normal . p = offset and p = depth * ray, so inverse depth is linear in the ray.
+/// Inverse depth of a plane as a linear function of the screen: factors of x and y, and a constant term. On the plane,
+/// normal . p = offset and p = depth * ray, so the inverse depth is linear in the ray.
 PICTURA_HD inline Vec3 inverse_depth_plane(const PinholeCamera& camera, const Frustum& f, const FacePlane& plane) {
   const Vec3 inverse = plane.normal * (has_inverse_depth(plane) ? reciprocal_in_range(plane.offset) : 0.0f);
   const float x = inverse.x * f.x_per_px, y = inverse.y * f.y_per_px;
   return {x, y, inverse.z - x * camera.center_x_px - y * camera.center_y_px};
 }
 
-/// Distance of the camera from a plane, along its normal; 0 where the plane has no inverse depth.
+/// Signed distance of a plane from the camera, along the plane's normal; 0 if the plane has no inverse depth.
 PICTURA_HD inline float plane_distance_m(const FacePlane& plane) {
   return has_inverse_depth(plane) ? plane.offset * reciprocal_in_range(sqrt_in_range(dot(plane.normal, plane.normal)))
                                   : 0.0f;
 }
 
-/// Sets the members of a face that follow from its plane and its bounds, which must meet the image.
+/// Sets the members of a face that depend on its plane and its bounds. The bounds must overlap the image.
 PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f, const ScreenBounds& bounds,
                                   const FacePlane& plane, ScreenFace* face_out) {
   face_out->box = pixel_box(camera, bounds);
@@ -118,9 +118,9 @@ PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f,
   face_out->plane_distance_m = plane_distance_m(plane);
 }
 
-/// Projects a clipped face (camera coordinates) of at most kMaxCorners corners, which lies in `plane`. Calls store_edge
-/// as make_edges does, and sets all members of face_out except those that complete_face() sets. Returns false if the
-/// face covers nothing.
+/// Projects a clipped face (camera coordinates) of at most kMaxCorners corners; `plane` is the plane of the face. Calls
+/// store_edge as make_edges() does. Sets all members of face_out except those that complete_face() sets. Returns false
+/// if the face covers nothing.
 template <int kMaxCorners, typename Corners, typename StoreEdge>
 PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frustum& f, const Corners& polygon,
                                         int count, const FacePlane& plane, Rgb color, StoreEdge&& store_edge,
@@ -155,8 +155,8 @@ struct ScreenQuad {
 /// or crossing (clipped first).
 enum class ClipClass : uint8_t { outside, inside, crossing };
 
-/// Projects a face of four corners, and widens strips to at least floor_px on screen. So faces that need no clipping,
-/// which are nearly all, are never widened in camera coordinates.
+/// Projects a face of four corners, and widens strips to at least floor_px on screen. So most faces, which need no
+/// clipping, are never widened in camera coordinates.
 PICTURA_HD inline ClipClass project_quad(const PinholeCamera& camera, const Vec3* corners, float floor_px,
                                          ScreenQuad* quad_out) {
   const float nearest_m = min_no_nan(min_no_nan(corners[0].z, corners[1].z), min_no_nan(corners[2].z, corners[3].z));
@@ -191,7 +191,8 @@ PICTURA_HD inline bool find_winding(const ScreenQuad& quad, float min_twice_area
   return fabsf(twice_area) >= min_twice_area_px2;
 }
 
-/// Variant of make_screen_face for a quad that project_quad found inside and find_winding found large enough.
+/// Variant of make_screen_face() for a quad for which project_quad() returned ClipClass::inside and find_winding()
+/// returned true.
 template <typename StoreEdge>
 PICTURA_HD inline void make_quad_face(const PinholeCamera& camera, const Frustum& f, const ScreenQuad& quad,
                                       bool is_clockwise, const FacePlane& plane, Rgb color, StoreEdge&& store_edge,
@@ -201,7 +202,7 @@ PICTURA_HD inline void make_quad_face(const PinholeCamera& camera, const Frustum
   set_bounds(camera, f, quad.bounds, plane, face_out);
 }
 
-/// 1 / depth of a face's plane at a screen point; negative where the plane is behind the camera.
+/// 1 / depth of a face's plane at a screen point; negative if the plane is behind the camera there.
 PICTURA_HD inline float inverse_depth(const ScreenFace& face, Vec2 at_px) {
   return face.inverse_depth_0 + face.inverse_depth_x * at_px.x + face.inverse_depth_y * at_px.y;
 }

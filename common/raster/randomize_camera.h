@@ -1,6 +1,7 @@
-// Randomized cameras: rotation, shift and zoom of a view's camera, and changes to the colours of its image. All are
-// functions of the view's key and the camera's index, so that a redrawn image has the same bits on every device. Every
-// value is drawn even if its range is 0, so that the range of one effect does not change other effects.
+// Randomized cameras: rotation, shift and zoom of a view's camera, and changes to the colours of its image. All these
+// are functions of the view's key and the camera's index, so that an image that is drawn again has the same bits on
+// every device. Every random value is drawn even if its range is 0, so that the range of one effect does not change
+// other effects.
 #pragma once
 
 #include "pictura/common/camera_randomization.h"
@@ -10,9 +11,9 @@
 
 namespace pictura {
 
-/// Mounting and sensitivity of a camera for an episode.
+/// Random deviations of a camera for one episode.
 struct CameraMounting {
-  float yaw_rad = 0, pitch_rad = 0, roll_rad = 0;  // about its own axes, with the signs of Camera's angles
+  float yaw_rad = 0, pitch_rad = 0, roll_rad = 0;  // about the camera's own axes, with the signs of Camera's angles
   Vec3 shift_m;                                    // in the ego frame
   float focal_factor = 1, brightness_factor = 1;
   bool is_dead = false;
@@ -78,7 +79,7 @@ struct ImageEffect {
 
   PICTURA_HD Rgb of(Rgb color, int x, int y) const {
     Philox4 random{};
-    if (noise_per_unit > 0) {  // takes most of an effect's time
+    if (noise_per_unit > 0) {  // the noise takes most of an effect's time
       random = philox4x32_10({{static_cast<uint32_t>(x), static_cast<uint32_t>(y), 0, 0}}, noise_key[0], noise_key[1]);
     }
     auto channel = [&](float value, uint32_t bits) {
@@ -91,7 +92,8 @@ struct ImageEffect {
 
   /// Standard deviation of noise_units(), a sum of four bytes.
   static constexpr float kNoiseDeviation = 147.8005413f;
-  /// Nearly normal noise in integers alone: the sum of four uniform bytes minus its mean.
+  /// Nearly normally distributed noise from integer operations alone: the sum of four uniform bytes minus the mean of
+  /// such sums.
   PICTURA_HD static constexpr int noise_units(uint32_t bits) {
     return static_cast<int>((bits & 255u) + (bits >> 8 & 255u) + (bits >> 16 & 255u) + (bits >> 24)) - 510;
   }

@@ -1,5 +1,5 @@
-// Faces of each primitive: convex polygons in camera coordinates, each with its faded colour, and the minimum width on
-// screen of thin strips. Shared by both devices.
+// Conversion of each primitive to faces: convex polygons in camera coordinates, with colours that fade with depth. Also
+// widens thin strips to a minimum width on screen. Shared by host and CUDA code.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -7,12 +7,12 @@
 
 namespace pictura {
 
-/// Value of the class plane: the front surface at a pixel's centre.
+/// Value of a pixel in CameraImages::class_id: the class of the front surface at the pixel's centre.
 enum class SurfaceClass : uint8_t { nothing, vehicle, cyclist, pedestrian, wall, light, strip };
 /// Class of a strip: kClassOfStrip + StripKind.
 constexpr int kClassOfStrip = static_cast<int>(SurfaceClass::strip);
 
-/// Number of sides of the polygon, equal in area to the disk, that represents a light.
+/// Number of sides of the polygon that represents the disk of a light. The polygon and the disk have equal areas.
 constexpr int kLightSides = 24;
 /// Maximum number of corners of a face before clipping.
 constexpr int kMaxFaceCorners = kLightSides;
@@ -27,8 +27,8 @@ PICTURA_HD inline FacePlane quad_plane(const Vec3* corners) {
   return {normal, dot(normal, corners[0])};
 }
 
-/// Brightness of a face: 1 minus the mean over its corners of depth / visible range, clamped to [0, 1]. A face with
-/// brightness 0 is not drawn and occludes nothing.
+/// Brightness of a face: 1 minus the mean over its corners of depth / kVisibleRange_m, each clamped to [0, 1]. A face
+/// with brightness 0 is not drawn and occludes nothing.
 PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
   float faded = 0.0f;
   PICTURA_UNROLL_FOUR
@@ -42,10 +42,10 @@ struct CameraFace {
   int count = 0;
   FacePlane plane;
   Rgb color;
-  float floor_px = 0;  // minimum width on screen of a strip that is still to be widened; 0 for other primitives
+  float floor_px = 0;  // strips that are not yet widened: minimum width on screen; 0 for other primitives
 };
 
-/// Colour of an agent's face before fading. The debug palette pales halted agents and greys parked agents.
+/// Colour of an agent's face before fading. The debug palette tints halted agents white and parked agents grey.
 PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool debug_palette) {
   const Rgb color = agent_color(box.agent_class, face);
   if (!debug_palette || box.palette == 0) return color;
@@ -53,8 +53,8 @@ PICTURA_HD inline Rgb agent_face_color(const AgentBox& box, BoxFace face, bool d
   return {0.5f * (color.r + tint), 0.5f * (color.g + tint), 0.5f * (color.b + tint)};
 }
 
-/// Faces of a cuboid: the faces of BoxFace, and the underside. The underside is visible from roads below a bridge and
-/// has the colour of the top.
+/// Faces of a cuboid: those of BoxFace, and the underside. The underside is visible from roads below a bridge, and has
+/// the colour of the top.
 constexpr int kUnderside = kNumBoxFaces, kNumCuboidFaces = kNumBoxFaces + 1;
 
 /// Bit mask of a box's front-facing faces, for a camera at eye_m.
@@ -131,12 +131,12 @@ PICTURA_HD inline bool quad_to_camera(const WorldQuad& quad, const PinholeCamera
   return brightness > 0.0f;
 }
 
-/// Wraps a quad in a CameraFace that points into it; floor_px is 0 except for strips.
+/// Returns a CameraFace that points to the corners of a quad. floor_px must be 0 unless the quad is a strip.
 PICTURA_HD inline CameraFace make_camera_face(const CameraQuad& quad, float floor_px) {
   return {quad.corner, 4, quad.plane, quad.color, floor_px};
 }
 
-/// Calls emit(face) for a quad unless the quad has faded to black; floor_px as in make_camera_face.
+/// Calls emit(face) for a quad unless the quad has faded to black. floor_px must be 0 unless the quad is a strip.
 template <typename Emit>
 PICTURA_HD inline void emit_quad(const WorldQuad& quad, const PinholeCamera& camera, float floor_px, Emit&& emit) {
   CameraQuad in_camera;
@@ -170,13 +170,13 @@ PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state,
   if (state == LightState::unknown) return false;
   const Vec2 to_eye = position_m.xy() - head.position_m.xy();
   const float ahead_m = dot(to_eye, head.facing);
-  // Compares the squares of cosines.
+  // The comparison of squared cosines needs no square root.
   const float cosine = max_no_nan(head.cos_half_angle, 0.0f);
   return ahead_m > 0.0f && ahead_m * ahead_m >= cosine * cosine * dot(to_eye, to_eye);
 }
 
-/// Corner, in world coordinates, of the polygon that represents a head. Corner 0 is left of the centre, and the
-/// following corners go upwards.
+/// Corner, in world coordinates, of the polygon that represents a light head. Corner 0 is left of the centre; the next
+/// corners are above it.
 PICTURA_HD inline Vec3 light_corner(const LightHead& head, int corner) {
   constexpr float kRadius_m = kLightRadius_m * 1.00574110f;  // sqrt(a / sin(a)), a = 2 pi / kLightSides
   const SinCos at = sincos_of(static_cast<float>(corner) * (kTwoPi / kLightSides));
@@ -184,12 +184,12 @@ PICTURA_HD inline Vec3 light_corner(const LightHead& head, int corner) {
   return {ground.x, ground.y, head.position_m.z + kRadius_m * at.sin};
 }
 
-/// Disk of a head: its plane in camera coordinates, and its colour, faded by the depth of its centre.
+/// Disk of a light head: its plane in camera coordinates, and its colour, which fades with the depth of its centre.
 struct LightDisk {
   FacePlane plane;
   Rgb color;
 };
-/// Transforms a head to camera coordinates; returns false if it has faded to black.
+/// Transforms a light head to camera coordinates; returns false if the head has faded to black.
 PICTURA_HD inline bool light_to_camera(const LightHead& head, LightState state, const PinholeCamera& camera,
                                        LightDisk* disk_out) {
   const Vec3 middle = to_camera(camera, head.position_m), facing{head.facing.x, head.facing.y, 0.0f};
@@ -199,7 +199,7 @@ PICTURA_HD inline bool light_to_camera(const LightHead& head, LightState state, 
   return brightness > 0.0f;
 }
 
-/// Calls emit(face) for the disk of a head if it is visible.
+/// Calls emit(face) for the disk of a light head if the disk is visible.
 template <typename Emit>
 PICTURA_HD inline void light_faces(const LightHead& head, LightState state, const PinholeCamera& camera, Emit&& emit) {
   if (!light_is_visible(head, state, camera.position_m)) return;
@@ -220,12 +220,12 @@ PICTURA_HD inline void strip_corners(const Strip& strip, Vec3* corners_out) {
   corners_out[3] = {b.x + at_b.x, b.y + at_b.y, b.z};
 }
 
-/// The widening of a strip, across it on screen.
+/// Widening of a strip on screen, perpendicular to the strip.
 struct Widening {
   Vec2 across;  // unit vector from the strip's right side to its left; 0 if the strip is a point on screen
   float floor_px = 0;
-  /// Displacement on screen of the left corner of an end of the strip, given its offset from the right corner. The
-  /// right corner moves the opposite way.
+  /// Displacement on screen of the left corner of one end of the strip, given the offset of the left corner from the
+  /// right corner. The right corner moves by the opposite displacement.
   PICTURA_HD Vec2 push_px(Vec2 gap_px) const {
     const float width_px = dot(gap_px, across);
     const float missing_px = 0.5f * max_no_nan(floor_px - fabsf(width_px), 0.0f);
@@ -233,19 +233,19 @@ struct Widening {
   }
 };
 
-/// Widening of a strip whose centre line runs from a to b, in camera coordinates; both may be scaled by the same
-/// factor. One end may be behind the camera: the line on screen is the same, and its direction does not matter.
+/// Widening of a strip whose centre line runs from a to b, in camera coordinates; a and b may be scaled by a common
+/// factor. One end may be behind the camera: the line on screen is then the same, and its direction does not matter.
 PICTURA_HD inline Widening widening_of(const PinholeCamera& camera, float floor_px, Vec3 a, Vec3 b) {
   // Direction on screen, times the product of both depths.
   const Vec2 ahead{camera.focal_x_px * (b.x * a.z - a.x * b.z), camera.focal_y_px * (b.y * a.z - a.y * b.z)};
-  constexpr float kLeast = 1e-12f;  // its square has a reciprocal
+  constexpr float kLeast = 1e-12f;  // the square of this length still has a finite reciprocal
   const float length2 = dot(ahead, ahead), min_length = max_no_nan(1e-6f * fabsf(a.z * b.z), kLeast);
   if (!(length2 > min_length * min_length)) return {};
   return {left_normal(ahead) * sqrt_in_range(reciprocal_in_range(length2)), floor_px};
 }
 
-/// Moves the two corners of one end of a strip apart to its minimum width on screen, unless one of them is before the
-/// near plane. Depths do not change.
+/// Moves the two corners of one end of a strip apart until the end has its minimum width on screen. Does nothing if a
+/// corner is closer than the near plane. Depths do not change.
 PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, const Widening& widening, Vec3* left, Vec3* right) {
   if (left->z < kNear_m || right->z < kNear_m) return;
   const float of_left = reciprocal_in_range(left->z), of_right = reciprocal_in_range(right->z);
@@ -259,7 +259,7 @@ PICTURA_HD inline void widen_strip_end(const PinholeCamera& camera, const Wideni
   right->y -= push.y * right->z;
 }
 
-/// Widens a strip to its minimum width on screen; `corners` are in camera coordinates and not yet clipped.
+/// Widens a strip to its minimum width on screen. `corners` must be in camera coordinates and not yet clipped.
 PICTURA_HD inline void widen_strip(const PinholeCamera& camera, float floor_px, Vec3* corners) {
   const Widening widening = widening_of(camera, floor_px, corners[0] + corners[1], corners[3] + corners[2]);
   widen_strip_end(camera, widening, &corners[0], &corners[1]);
@@ -273,27 +273,29 @@ PICTURA_HD inline WorldQuad strip_quad(const Strip& strip) {
   return quad;
 }
 
-/// Emits the strip's face, in the plane of the strip and not yet widened to floor_px.
+/// Calls emit(face) for a strip's face, which is not yet widened to floor_px.
 template <typename Emit>
 PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& camera, float floor_px, Emit&& emit) {
   emit_quad(strip_quad(strip), camera, floor_px, emit);
 }
 
-/// Maximum difference in height of strips on one level, where the rank decides instead of the depth.
+/// Strips are on one level if their heights differ by less than this. The rank of such strips decides which of them is
+/// in front, instead of the depth.
 constexpr float kSameLevel_m = 0.05f;
-/// Factor that widens the depth range of a strip's corners, to which the strip's depth is clamped. When the camera is
-/// close to the strip's plane, the depth of the plane varies without bound within a pixel.
+/// The depth of a strip is clamped to the range of its corners' depths, widened by this factor. When the camera is
+/// close to the strip's plane, the depth of the plane would vary without bound within a pixel.
 constexpr float kWidenedDepth = 2.0f;
-/// Relative difference below which depths are equal, so that rounding does not decide between faces in one plane.
+/// Relative difference below which depths count as equal, so that rounding does not decide between faces in one plane.
 constexpr float kEqualDepth = 1e-4f;
-/// A solid stands on a strip if their outlines overlap on the ground plane and the centre of its base is at most this
-/// far from the strip's plane. The distance is positive because upright boxes cut into slopes.
+/// A solid (a box, wall or light) stands on a strip if their outlines overlap on the ground plane and the centre of the
+/// solid's base is at most this far from the strip's plane. The distance is not 0, because upright boxes cut into
+/// slopes.
 constexpr float kStanding_m = 0.5f;
-/// Maximum depth to which solids that stand on a strip extend through its plane. Only culling uses it: an occluder
-/// hides a strip that is seen from below only if it is in front of such solids, too.
+/// Maximum distance by which solids that stand on a strip extend below its plane. Only culling uses this distance: if a
+/// strip is seen from below, an occluder hides the strip only if the occluder is also in front of these solids.
 constexpr float kThroughStrip_m = 4.0f * kStanding_m;
 
-/// Rank of a strip: where strips of one level overlap, the lower rank is in front.
+/// Rank of a strip: where strips on one level overlap, the strip with the lower rank is in front.
 PICTURA_HD constexpr int strip_rank(StripKind kind) {
   // Two bits per kind, from the lowest: lane mark, road edge, crosswalk, stop line.
   constexpr int kRanks = 2 | 3 << 2 | 1 << 4 | 0 << 6;

@@ -1,6 +1,7 @@
-// Visibility within a pixel: the front face of two, and the samples that fragments occlude of each other. The decision
-// is made per pair of fragments, at the centroid of the samples that both cover: the nearer plane is in front. So
-// cycles, slopes and intersections need no order of whole primitives. Shared by both devices.
+// Visibility within a pixel. A fragment is the part of a pixel that one face covers. For each pair of fragments, the
+// functions below decide which samples one fragment hides from the other. The decision is made at the centroid of the
+// samples that both fragments cover: the face with the nearer plane is in front. So cyclic overlaps, slopes and
+// intersections need no order of whole primitives. Shared by host and CUDA code.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -9,7 +10,8 @@
 
 namespace pictura {
 
-// Object ids are unique within an image: kind, then index. Ids of strips ascend with their rank.
+// Object ids are unique within an image. The highest bits are the kind, the lowest bits the index. Strips also have
+// bits for their rank, above the index.
 constexpr int kKindShift = 30, kRankShift = 28;
 constexpr uint32_t kAgentKind = 0, kWallKind = 1, kLightKind = 2, kStripKind = 3;
 constexpr uint32_t kIndexMask = (1u << kRankShift) - 1;
@@ -22,7 +24,7 @@ PICTURA_HD inline uint32_t strip_object_id(const Strip& strip, int32_t index) {
   return (kStripKind << kKindShift) | (static_cast<uint32_t>(strip_rank(strip.kind)) << kRankShift) |
          static_cast<uint32_t>(index);
 }
-/// An entry of a list of visible faces: the object id and, for agents, the number of the face.
+/// Entry of a list of visible faces: the object id, and in higher bits the number of an agent's face.
 constexpr int kFaceShift = 27;
 constexpr uint32_t kFaceIndexMask = (1u << kFaceShift) - 1;
 PICTURA_HD constexpr uint32_t face_entry(uint32_t object_id, int face) {
@@ -32,8 +34,8 @@ PICTURA_HD constexpr uint32_t kind_of(uint32_t object_id) { return object_id >> 
 PICTURA_HD constexpr int32_t index_of(uint32_t object_id) { return static_cast<int32_t>(object_id & kIndexMask); }
 PICTURA_HD constexpr bool is_strip(const ScreenFace& face) { return kind_of(face.object_id) == kStripKind; }
 
-/// Outline of a primitive on the ground: four corners, each at the height of the primitive's lower end. For a line,
-/// each end occurs twice.
+/// Outline of a primitive on the ground plane: four corners, at the height of the primitive's lower end. If the outline
+/// is a line, each end occurs twice.
 struct Extent {
   Vec3 corner[4];
 };
@@ -67,8 +69,8 @@ PICTURA_HD inline Extent extent_of(uint32_t object_id, const StaticGeometryView&
   }
 }
 
-/// Corners on the ground. turn() rotates the corners, so that all sides are visited without an index, which would force
-/// the corners into a device's local memory.
+/// Corners on the ground plane. turn() rotates the corners, so that code visits all sides without an index. An index
+/// would force the corners into a CUDA thread's local memory.
 struct GroundQuad {
   Vec2 corner[4];
   PICTURA_HD void turn() {
@@ -100,8 +102,8 @@ PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQua
     return interval;
   };
   const Interval of_a = project(a), of_b = project(b);
-  // Displacement along the axis until the quads touch, times the side's length. It is positive even for a wall, whose
-  // interval may be a point within the other interval.
+  // Displacement along the axis until the quads only touch, times the side's length. The displacement is positive even
+  // if one interval is a point (that of a wall) within the other interval.
   const float overlap = min_no_nan(of_a.high - of_b.low, of_b.high - of_a.low);
   const float length2_m2 = dot(side, side);
   return length2_m2 > 1e-12f && (overlap <= 0.0f || overlap * overlap <= kTouching_m * kTouching_m * length2_m2);
@@ -109,7 +111,7 @@ PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQua
 
 /// Whether two extents overlap on the ground plane: no side of either extent separates them.
 PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
-  // Relative to a nearby point, for precision.
+  // Coordinates are relative to a nearby point, for precision.
   const Vec2 origin = a.corner[0].xy();
   GroundQuad one = ground_quad(a, origin), other = ground_quad(b, origin);
   PICTURA_NO_UNROLL
@@ -124,8 +126,8 @@ PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
   return true;
 }
 
-/// Whether a solid stands on a strip (see kStanding_m). Such a solid is above the strip: in front of it seen from
-/// above, behind it seen from below.
+/// Whether a solid stands on a strip (see kStanding_m). Such a solid is above the strip: it is in front of the strip
+/// for a camera above, and behind the strip for a camera below.
 PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
   Vec3 sum{};
   for (const Vec3 corner : solid.corner) sum = sum + (corner - strip.corner[0]);
@@ -134,33 +136,35 @@ PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
   return fabsf(dot(normal, middle)) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
 }
 
-/// Whether a face is a strip that is seen from below. Such a strip is in front of all solids that stand on it,
-/// including nearer ones, because these extend through it.
+/// Whether a face is a strip that is seen from below. Such a strip is in front of all solids that stand on it, even of
+/// nearer solids, because solids extend through the strip.
 PICTURA_HD inline bool is_strip_from_below(const ScreenFace& face) { return face.plane_distance_m > 0.0f; }
 
-/// Maximum ratio of the inverse depths of a solid that stands on a strip and of the strip, on one ray from an eye at
-/// this distance below the strip's plane. Solids extend up to kThroughStrip_m through the plane. The ratio is infinite
-/// where the eye is within that distance, and 1 where the eye is above the plane.
+/// Maximum, on a ray from the camera, of a solid's inverse depth divided by a strip's inverse depth, if the solid
+/// stands on the strip. The camera is plane_distance_m below the strip's plane, and solids extend up to kThroughStrip_m
+/// below the plane. The ratio is infinite if the camera is within that distance, and 1 if the camera is above the
+/// plane.
 PICTURA_HD inline float nearest_standing(float plane_distance_m) {
   if (!(plane_distance_m > 0.0f)) return 1.0f;
   return plane_distance_m > kThroughStrip_m ? plane_distance_m * reciprocal_in_range(plane_distance_m - kThroughStrip_m)
                                             : float_from_bits(0x7F800000u);
 }
 
-/// 1 / depth of a face at a screen point, clamped to the depths of its corners, with the range widened by kWidenedDepth
-/// for strips. Used to compare faces.
+/// 1 / depth of a face at a screen point, clamped to the range of its corners. For strips, the range is widened by
+/// kWidenedDepth. Faces are compared by this value.
 PICTURA_HD inline float clamped_inverse_depth(const ScreenFace& face, Vec2 at_px) {
   return clamp(inverse_depth(face, at_px), face.inverse_depth_low, face.inverse_depth_high);
 }
 
-/// Depth (camera z) of a face at a screen point, clamped to the depths of its corners.
+/// Depth (camera z) of a face at a screen point, clamped to the range of its corners' depths.
 PICTURA_HD inline float face_depth_m(const ScreenFace& face, Vec2 at_px) {
   const float widened = is_strip(face) ? kWidenedDepth : 1.0f;
   return 1.0f / clamp(inverse_depth(face, at_px), face.inverse_depth_low * widened, face.inverse_depth_high / widened);
 }
 
-/// Whether two strips are on one level at a screen point: at the depth of the nearer strip, their planes have nearly
-/// the same height. A widened strip has a depth even beyond the horizon, where its plane does not reach.
+/// Whether two strips are on one level at a screen point: at the depth of the nearer strip, the heights of their planes
+/// differ by less than kSameLevel_m. Depths are clamped, because a widened strip may extend beyond the horizon of its
+/// plane.
 PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
   const float nearest = max_of(clamped_inverse_depth(a, at_px), clamped_inverse_depth(b, at_px));
   // Heights above the two planes, times the inverse depth.
@@ -169,7 +173,7 @@ PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Ve
   return fabsf(above_a - above_b) < kSameLevel_m * nearest;
 }
 
-/// Whether two inverse depths are equal, see kEqualDepth.
+/// Whether two inverse depths count as equal, see kEqualDepth.
 PICTURA_HD inline bool are_equal_depths(float inverse_depth_a, float inverse_depth_b) {
   return fabsf(inverse_depth_a - inverse_depth_b) < kEqualDepth * max_of(inverse_depth_a, inverse_depth_b);
 }
@@ -184,19 +188,20 @@ PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec
   const bool first = are_equal_depths(inverse_depth_a, inverse_depth_b) ? a.object_id < b.object_id
                                                                         : inverse_depth_a > inverse_depth_b;
   if (strip_a == strip_b) return first;
-  // Depth puts the solid under the strip. A solid that stands on the strip only cuts into the road.
+  // By depth, the solid is beneath the strip. If the solid stands on the strip, it only cuts into the road, and the
+  // order is reversed.
   const bool is_strip_first = first == strip_a, is_from_below = is_strip_from_below(strip_a ? a : b);
   if (is_strip_first == is_from_below) return first;
   return stands(strip_a ? b.object_id : a.object_id, strip_a ? a.object_id : b.object_id) ? !first : first;
 }
 
-/// Sums over samples: of their columns, of their rows, and of their columns' offsets in eighths of a row (see
-/// sample_column_offset).
+/// Sums over samples: of the samples' columns, of their rows, and of the offsets of their columns in eighths of a row
+/// (see sample_column_offset()).
 struct SampleSums {
   int32_t columns, rows, offsets;
 };
 PICTURA_HD inline SampleSums sums_of(uint64_t samples) {
-  // Each sum is computed bit by bit.
+  // Each sum is computed from the bits of the column or row numbers.
   const int column_0 = popcount(samples & 0xFF00FF00FF00FF00ull), column_1 = popcount(samples & 0xFFFF0000FFFF0000ull),
             column_2 = popcount(samples & 0xFFFFFFFF00000000ull);
   const int rows = popcount(samples & 0xAAAAAAAAAAAAAAAAull) + 2 * popcount(samples & 0xCCCCCCCCCCCCCCCCull) +
@@ -217,7 +222,7 @@ PICTURA_HD inline Vec2 centroid_of(uint64_t samples) {
 /// A face's coverage of one pixel.
 struct Fragment {
   PixelCoverage coverage;
-  float inverse_depth = 0;  // at the centroid of its samples
+  float inverse_depth = 0;  // at the centroid of the fragment's samples
   int32_t face = 0;
 };
 
@@ -231,7 +236,8 @@ PICTURA_HD inline Vec2 pixel_center(int x, int y) {
   return {static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
 }
 
-/// Inverse depth of a face at a pixel's centre; equal to that of its fragment if it covers the pixel fully.
+/// Inverse depth of a face at a pixel's centre. If the face covers the pixel fully, its fragment has the same inverse
+/// depth.
 PICTURA_HD inline float center_inverse_depth(const ScreenFace& face, int x, int y) {
   return clamped_inverse_depth(face, pixel_center(x, y));
 }
@@ -240,12 +246,12 @@ PICTURA_HD inline float inverse_depth_half_range(const ScreenFace& face) {
   return 0.5f * (fabsf(face.inverse_depth_x) + fabsf(face.inverse_depth_y));
 }
 
-/// Number of bits of occluder_bound() that may be set, the highest of a float.
+/// Number of bits of occluder_bound() that may be set: the highest bits of a float.
 constexpr int kOccluderBoundBits = 21;
-/// Lower bound of the inverse depth, over a pixel, of a face that covers it fully. Faces with a smaller inverse depth
-/// everywhere in the pixel are fully occluded. The bound is 0 for strips, which occlude nothing here: other strips are
-/// painted over them, and a solid behind a strip may stand on it. Never negative or NaN, because kernels sort by its
-/// bits. Lower by more than kEqualDepth, so that a face occludes neither itself nor an equally near face.
+/// Lower bound of a face's inverse depth within a pixel that the face covers fully. The face hides all faces with a
+/// smaller inverse depth everywhere in the pixel. The bound of a strip is 0, because other strips may be painted over
+/// the strip, and a solid behind the strip may stand on it. The bound is never negative or NaN, because kernels sort by
+/// its bits. It is reduced by more than kEqualDepth, so that a face hides neither itself nor an equally near face.
 PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   if (is_strip(face)) return 0.0f;
   const float lowest =
@@ -254,23 +260,23 @@ PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   return float_from_bits(bits_from_float(lowest * kLower) & ~((1u << (32 - kOccluderBoundBits)) - 1));
 }
 
-/// Returns false if the face lies entirely behind the occluder bound of pixel (x, y), including, for a strip seen from
-/// below, all solids that may stand on it. Such a face gets no fragment, because the face with the largest bound would
-/// occlude it. A device may test against the bounds of other full faces first, in any order: these bounds are smaller,
-/// so the largest bound rejects whatever they reject.
+/// Whether any part of the face may be in front of the largest occluder bound of pixel (x, y). For a strip seen from
+/// below, the test includes all solids that may stand on the strip. If the result is false, the face gets no fragment,
+/// because the face with that bound hides it. CUDA code may first test against bounds of other faces, in any order,
+/// because the largest bound rejects every face that a smaller bound rejects.
 PICTURA_HD inline bool passes_occluder_bound(const ScreenFace& face, float bound, int x, int y) {
   const float nearest = center_inverse_depth(face, x, y) + inverse_depth_half_range(face);
   return !(nearest * face.nearest_standing < bound);
 }
 
-/// Order of fragments, independent of the order of their list: nearer first, then by object id.
+/// Order of fragments, independent of their order in the list: nearer fragments first, then by object id.
 PICTURA_HD inline bool is_nearer(const Fragment& a, const Fragment& b, const ScreenFace* faces) {
   if (a.inverse_depth != b.inverse_depth) return a.inverse_depth > b.inverse_depth;
   const uint32_t object_id_a = faces[a.face].object_id, object_id_b = faces[b.face].object_id;
   return object_id_a != object_id_b ? object_id_a < object_id_b : a.face < b.face;
 }
 
-/// Samples that two fragments of a pixel share. A sliver, which touches no sample, shares all samples of the other
+/// Samples that two fragments of a pixel share. A sliver (a fragment without samples) shares all samples of the other
 /// fragment. If the result is 0, neither fragment occludes the other.
 PICTURA_HD inline uint64_t shared_samples(const PixelCoverage& a, const PixelCoverage& b) {
   return a.samples != 0 && b.samples != 0 ? a.samples & b.samples : a.samples | b.samples;
@@ -286,15 +292,15 @@ PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Ve
   return samples_inside(edge, -edge.x0, -edge.y0);
 }
 
-/// Returns the shared samples of faces a and b, of two primitives, at which a is in front. One decision, made at the
-/// centroid, holds for all shared samples, unless two solids change places within a pixel of the centroid and
-/// all_or_none is false. Then each sample is decided separately, by the rule of is_in_front(): the lower object id is
-/// in front unless the other face is nearer by more than kEqualDepth. At all other samples, b is in front.
+/// Returns the shared samples at which face a is in front of face b; a and b belong to two primitives. At the other
+/// shared samples, b is in front. Usually, one decision at the centroid holds for all shared samples. If two solids
+/// intersect within a pixel of the centroid and all_or_none is false, each sample is decided separately by the rule of
+/// is_in_front(): the lower object id is in front unless the other face is nearer by more than kEqualDepth.
 template <typename Stands>
 PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
                                             bool all_or_none, Stands&& stands) {
   const Vec2 middle = centroid_of(shared), at = corner + middle;
-  // Always the lower object id first, so that swapping a and b gives the same arithmetic.
+  // The face with the lower object id is always the first operand, so that swapping a and b gives the same arithmetic.
   const bool swapped = b.object_id < a.object_id;
   const float inverse_depth_a = inverse_depth(a, at), inverse_depth_b = inverse_depth(b, at);
   const float sign = swapped ? -1.0f : 1.0f;
@@ -308,16 +314,16 @@ PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFac
   return shared & (swapped ? ~low_first : low_first);
 }
 
-/// Whether two fragments, at least one of them a sliver, together fill a pixel exactly: neighbouring surfaces that meet
-/// there. The tolerance equals the accuracy of their areas; a larger tolerance would take slivers of hidden surfaces
-/// for neighbours. A fragment that fills the pixel by itself has no neighbour there.
+/// Whether two fragments belong to neighbouring surfaces that meet in the pixel: at least one is a sliver, and together
+/// they fill the pixel exactly. The tolerance equals the accuracy of the areas; with a larger tolerance, slivers of
+/// hidden surfaces would count as neighbours. A fragment that fills the pixel alone has no neighbour.
 PICTURA_HD inline bool are_complementary(const PixelCoverage& a, const PixelCoverage& b) {
   constexpr float kExact = 1e-5f;
   return (a.samples == 0 || b.samples == 0) && max_of(a.area, b.area) < 1.0f && fabsf(a.area + b.area - 1.0f) < kExact;
 }
 
 /// Whether two fragments of a pixel may still occlude more of each other, given their visible samples. Visible samples
-/// only decrease, so a skipped pair stays irrelevant, in any order of pairs.
+/// only decrease, so if the result is false, it remains false, whatever the order of pairs.
 PICTURA_HD inline bool may_occlude_more(uint64_t visible_a, uint64_t samples_a, uint64_t visible_b,
                                         uint64_t samples_b) {
   return ((visible_a & samples_b) | (visible_b & samples_a)) != 0;
@@ -328,9 +334,10 @@ struct OccludedSamples {
   uint64_t of_a = 0, of_b = 0;
 };
 
-/// Samples that two fragments of different primitives occlude of each other. `shared` are the samples that both
-/// fragments cover, `a_first` the shared samples at which a is in front. A sliver occludes nothing and is occluded as a
-/// whole. A fragment that covers the whole pixel is occluded only by another such fragment (see PixelAccumulator).
+/// For two fragments of different primitives, the samples of each that the other occludes. `shared` are the samples
+/// that both fragments cover; `a_first` are the shared samples at which a is in front. A sliver occludes nothing, and
+/// is occluded as a whole. A fragment that covers the whole pixel is occluded only by another fragment that does (see
+/// PixelAccumulator).
 PICTURA_HD inline OccludedSamples occluded_samples(const PixelCoverage& a, const PixelCoverage& b, uint64_t shared,
                                                    uint64_t a_first) {
   if (a.samples == 0 || b.samples == 0) {

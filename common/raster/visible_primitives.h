@@ -1,5 +1,5 @@
-// Iteration over the primitives of a scene that may be visible in an image, kind by kind, in an order that depends only
-// on the scene. For renderers that draw an image in one thread.
+// Iteration over the primitives that may be visible in an image, one function per kind. The order depends only on the
+// scene. For renderers that draw an image in one thread.
 #pragma once
 
 #include "pictura/common/raster/face_setup.h"
@@ -31,7 +31,7 @@ PICTURA_HD inline void visit_walls(const ImageSetting& setting, const StaticGeom
       });
 }
 
-/// States of the lights of a view's world; empty where no light is drawn.
+/// States of the lights in a view's world; empty if the view's images show no lights.
 PICTURA_HD inline Span<const LightState> light_states_of(const SceneBatch& scene, const View& view) {
   if ((view.hides & kHidesLights) != 0) return {};
   const int32_t begin = scene.light_begin[view.world];

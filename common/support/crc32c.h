@@ -1,5 +1,5 @@
-// CRC-32C (Castagnoli; polynomial 0x1EDC6F41, reflected), by tables for eight bytes at a time, and TFRecord's masked
-// form.
+// CRC-32C checksums (Castagnoli; polynomial 0x1EDC6F41, reflected), eight bytes at a time, and the masked form of
+// TFRecord files.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ namespace crc32c_tables {
 
 constexpr std::uint32_t kReflectedPolynomial = 0x82F63B78u;
 
-/// Tables of the sum: table k gives a byte's contribution when k more bytes follow it.
+/// Lookup tables: table k gives a byte's contribution to the checksum when k more bytes follow it.
 constexpr std::array<std::array<std::uint32_t, 256>, 8> make_tables() {
   std::array<std::array<std::uint32_t, 256>, 8> tables{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {

@@ -28,7 +28,8 @@ bool is_same_version(const struct stat& a, const struct stat& b) {
 
 constexpr std::size_t kChunk_bytes = std::size_t{1} << 16;
 
-/// A file open for reading. Opening a FIFO does not wait for its writer; reading does, and can be interrupted.
+/// A file that is open for reading. Opening a FIFO does not wait for its writer. Reading it waits, and can be
+/// interrupted.
 class InputFile {
  public:
   explicit InputFile(const std::string& path)
@@ -40,11 +41,11 @@ class InputFile {
     PICTURA_CHECK(!S_ISDIR(opened_.st_mode), "{}: expected a file, got a folder", path_);
   }
 
-  /// Whether the size of the file is known in advance; pipes and similar files have none.
+  /// Whether the size of the file is known in advance; it is unknown for pipes and similar files.
   bool is_regular() const { return S_ISREG(opened_.st_mode); }
   std::size_t size_bytes() const { return static_cast<std::size_t>(opened_.st_size); }
 
-  /// Throws Error unless the bytes read are the whole file, unchanged since it was opened.
+  /// Throws Error unless the bytes read are the whole file and the file is unchanged since it was opened.
   void check_unchanged(std::size_t bytes_read) const {
     if (!is_regular()) return;
     // The kernel's own files report size 0 but contain bytes.
@@ -73,7 +74,7 @@ class InputFile {
     return result;
   }
 
-  // Waits until there are bytes or no writer is left; returns at once for regular files.
+  // Waits until there are bytes or no writer is left. For regular files, returns immediately.
   void wait_for_bytes() const {
     constexpr int kPoll_ms = 100;
     pollfd slot{.fd = file_.get(), .events = POLLIN, .revents = 0};
@@ -167,7 +168,8 @@ void make_output_folder(const std::string& path) {
                 making   ? making.message()
                 : asking ? asking.message()
                          : "it is a file");
-  // Tests by writing: permission bits do not show read-only mounts, and a superuser passes access().
+  // Tests by writing a file, because permission bits do not show read-only mounts, and access() succeeds for a
+  // superuser.
   try {
     const OutputFile probe((fs::path(path) / ".probe").string());
   } catch (const Error& error) {

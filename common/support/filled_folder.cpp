@@ -20,7 +20,8 @@ namespace {
 // Terminator of each name in a list; file names cannot contain it.
 constexpr char kEnd = '\0';
 
-// Whether a name is a plain file name. Names in lists of a folder from elsewhere may lead out of the folder.
+// Whether a name is a plain file name. In a folder of unknown origin, the list may contain names that lead out of the
+// folder.
 bool is_plain(const std::string& name) { return !name.empty() && fs::path(name).filename() == name; }
 
 }  // namespace
@@ -42,7 +43,8 @@ std::string FilledFolder::file(const std::string& name) {
   PICTURA_CHECK(!fs::is_symlink(path, ignored), "{}: expected a file or nothing, got a link", path);
   written_.insert(name);
   if (!listed_.insert(name).second) return path;
-  // Listed before the file exists, so that the next call knows the file wherever this call ends.
+  // The name is listed before the file exists, so that the next call finds it even if the process ends before or during
+  // the writing.
   const std::string line = name + kEnd;
   const bool is_listed = ::write(list_file_.get(), line.data(), line.size()) == static_cast<ssize_t>(line.size());
   PICTURA_CHECK(is_listed, "{}: cannot be written: {}", list_, std::strerror(errno));

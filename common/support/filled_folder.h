@@ -1,4 +1,4 @@
-// Folders that a command fills with files of its own naming.
+// Folders that a command fills with files whose names the command chooses.
 #pragma once
 
 #include <set>
@@ -9,16 +9,16 @@
 
 namespace pictura {
 
-/// A folder that a command refills: files that earlier calls of the same kind wrote, and this call does not, are
-/// removed. A hidden list in the folder, .pictura-KIND, holds the names of written files; all other files stay.
+/// A folder that a command refills. Files that an earlier call of the same kind wrote are removed, unless this call
+/// writes them again. The hidden file .pictura-KIND in the folder lists the written files; all other files stay.
 class FilledFolder {
  public:
-  /// Creates the folder. Throws Error as make_output_folder() does, and for a list that is a link.
+  /// Creates the folder. Throws Error as make_output_folder() does, or if the list is a symbolic link.
   FilledFolder(std::string folder, const std::string& kind);
 
   const std::string& path() const { return folder_; }
-  /// Returns "FOLDER/NAME" for the next file to write. Throws Error for a link of that name, which would lead out of
-  /// the folder.
+  /// Returns "FOLDER/NAME" for the next file to write. Throws Error if that name is a symbolic link, because the link
+  /// may lead out of the folder.
   std::string file(const std::string& name);
   /// Removes files of earlier calls whose names were not passed to file().
   void remove_others();

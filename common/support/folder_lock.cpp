@@ -23,7 +23,7 @@ std::string holder_of(int fd) {
 }  // namespace
 
 FolderLock::FolderLock(const std::string& folder)
-    // No links: in a folder from elsewhere, a link would redirect this write to any file.
+    // Links are refused, because in a folder of unknown origin, a link could redirect this write to any file.
     : fd_(::open((folder + "/lock").c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0666)) {
   PICTURA_CHECK(fd_ >= 0 || errno != ELOOP, "{}/lock: expected a file, got a link", folder);
   PICTURA_CHECK(fd_ >= 0, "{}/lock: cannot be opened: {}", folder, std::strerror(errno));

@@ -7,8 +7,8 @@
 
 namespace pictura {
 
-/// A lock on a folder for the lifetime of this object and its process, however the process ends. It locks the file
-/// `lock` there (flock), which remains and records the last holder. The lock is advisory.
+/// A lock on a folder, held until this object is destroyed or the process ends for any reason. It locks the file `lock`
+/// in the folder with flock; that file remains and records the last holder. The lock is advisory.
 class FolderLock {
  public:
   /// Throws Error naming the folder and the process that holds the lock.

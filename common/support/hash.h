@@ -1,5 +1,5 @@
-// A 64-bit hash (FNV-1a over bytes) for images, simulator states and policies: 16 hexadecimal digits for comparing two
-// runs. Not for security.
+// A 64-bit hash (FNV-1a over bytes) of images, simulator states and policies. Its 16 hexadecimal digits show whether
+// the results of two runs are equal. It is not for security.
 #pragma once
 
 #include <cstdint>

@@ -26,8 +26,8 @@ extern "C" void on_interrupt(int signal) {
     first_signal = signal;
     return;
   }
-  // One request may arrive twice: timeout(1) signals its child and then the child's group, and both the shell and the
-  // kernel report a terminal that hangs up.
+  // One request may arrive as two signals: timeout(1) signals its child and then the child's group, and both the shell
+  // and the kernel report a terminal that hangs up.
   constexpr std::time_t kSameRequest_ms = 100;
   if (signal != SIGHUP && now_ms() - first_came_ms > kSameRequest_ms) _exit(128 + signal);
 }
@@ -41,7 +41,7 @@ void catch_interrupts() {
 
 void record_interrupt(int signal) {
   if (first_signal) return;
-  first_came_ms = now_ms();  // the same request may also reach this process a moment later
+  first_came_ms = now_ms();  // this process may receive a signal of the same request a moment later
   first_signal = signal;
 }
 

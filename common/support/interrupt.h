@@ -1,4 +1,5 @@
-// Handling of ^C and of termination signals: long work polls for them between its steps instead of dying at once.
+// Handling of ^C and of termination signals: long work polls for a signal between its steps, instead of ending
+// immediately.
 #pragma once
 
 #include <string>
@@ -6,14 +7,15 @@
 
 namespace pictura {
 
-/// Records the first SIGINT, SIGTERM or SIGHUP from now on. A second SIGINT or SIGTERM ends the process at once with
-/// status 128 + its number. SIGHUP stays ignored where it already is (nohup).
+/// Records the first SIGINT, SIGTERM or SIGHUP from now on. A second SIGINT or SIGTERM ends the process immediately,
+/// with status 128 + the signal's number. If SIGHUP is already ignored (nohup), it stays ignored.
 void catch_interrupts();
 
-/// Returns the first signal, or 0. Always 0 unless catch_interrupts() or record_interrupt() was called.
+/// Returns the number of the recorded signal, or 0. Always 0 unless catch_interrupts() or record_interrupt() was
+/// called.
 int interrupting_signal();
 
-/// Records a signal if none is recorded: another process that cooperates with this one received it.
+/// Records a signal that a cooperating process received, unless a signal is already recorded.
 void record_interrupt(int signal);
 
 /// Clears the recorded signal, for a process that continues after it has ended the interrupted work.
@@ -23,13 +25,13 @@ inline bool interrupted() { return interrupting_signal() != 0; }
 /// Throws Interrupted if a signal is recorded.
 void throw_if_interrupted();
 
-/// A piece of work that a signal stops, unless a signal came before the work began: work that begins after a signal is
-/// part of an orderly end, such as plotting the curve learnt so far.
+/// A piece of work that a signal interrupts. Work that began after a signal is not interrupted, because it is part of
+/// an orderly end, such as plotting the learning curve so far.
 class InterruptibleWork {
  public:
   /// `message` describes the interrupted work.
   explicit InterruptibleWork(std::string message) : message_(std::move(message)) {}
-  /// Throws Interrupted if a signal came after the work began.
+  /// Throws Interrupted if the first signal came after the work began.
   void check() const;
 
  private:

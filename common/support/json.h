@@ -1,4 +1,4 @@
-// Reading and writing of JSON. JSON has neither infinity nor NaN. Input from outside may be nested to any depth.
+// Reading and writing of JSON. JSON has neither infinity nor NaN. External input may be nested to any depth.
 #pragma once
 
 #include <cmath>
@@ -14,8 +14,8 @@ using Json = nlohmann::ordered_json;
 /// Returns the number, or null if it is infinite or NaN.
 inline Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-/// Maximum nesting depth of text, far above all that pictura writes or reads. The library writes, copies and compares
-/// recursively, so that deeper values would overflow the stack.
+/// Maximum nesting depth of JSON text, far above the depth of all files of pictura. The JSON library writes, copies and
+/// compares values recursively, so deeper values could overflow the stack.
 constexpr int kMaxJsonDepth = 64;
 
 /// Offset of the first byte of JSON text that is nested deeper than kMaxJsonDepth; npos if there is none.
@@ -38,8 +38,9 @@ inline size_t first_too_deep(std::string_view text) {
   return std::string_view::npos;
 }
 
-/// The only parser of JSON from outside. Throws the library's parse_error if the text is not JSON or is nested deeper
-/// than kMaxJsonDepth. If allow_exceptions is false, returns a value with is_discarded() instead.
+/// Parses JSON; all external JSON is parsed here. Throws the JSON library's parse_error if the text is not JSON or is
+/// nested deeper than kMaxJsonDepth. If allow_exceptions is false, returns a value whose is_discarded() is true
+/// instead.
 template <typename Value = Json>
 Value parse_json(std::string_view text, bool allow_exceptions = true) {
   const size_t too_deep = first_too_deep(text);

@@ -14,7 +14,8 @@ namespace pictura {
 
 void open_standard_streams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    // The lowest free number is this stream's. Read-only, so that writing fails as on a closed descriptor.
+    // open() returns the lowest free number, which is this stream's. Read-only, so that writing fails as on a closed
+    // descriptor.
     if (::fcntl(stream, F_GETFD) < 0) ::open("/dev/null", O_RDONLY);
   }
   std::signal(SIGPIPE, SIG_IGN);
@@ -24,7 +25,7 @@ void print_result_text(const std::string& text) { std::fwrite(text.data(), 1, te
 void print_message_text(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stderr); }
 
 void close_stdout() {
-  // A flush does not report bytes that an earlier call lost.
+  // fclose() does not report bytes that an earlier call lost.
   errno = 0;
   const bool lost = std::ferror(stdout) != 0;
   const bool closed = std::fclose(stdout) == 0;

@@ -1,5 +1,5 @@
-// Output of programs for people: results on stdout, messages on stderr. Printing never throws. A failing stdout is an
-// error after the work is saved (close_stdout()); a failing stderr loses messages.
+// Printed output of programs: results on stdout, messages on stderr. Printing never throws. Lost output on stdout is an
+// error when the program calls close_stdout(), after its work is saved. Lost messages on stderr are ignored.
 #pragma once
 
 #include <string>
@@ -12,12 +12,12 @@
 
 namespace pictura {
 
-/// Opens /dev/null on those of descriptors 0 to 2 that are closed, so that no file opened later gets their numbers and
-/// receives printed output. Also ignores SIGPIPE: a reader that has ended becomes a write error. Call at the beginning
-/// of main().
+/// Opens /dev/null for each closed descriptor among 0, 1 and 2. Otherwise a file that is opened later could get that
+/// number and receive printed output. Also ignores SIGPIPE, so that output to a pipe without a reader is a write error.
+/// Call at the beginning of main().
 void open_standard_streams();
 
-/// Print on stdout and on stderr.
+/// Print a result on stdout, or a message on stderr.
 void print_result_text(const std::string& text);
 void print_message_text(const std::string& text);
 template <typename... T>
@@ -28,10 +28,10 @@ template <typename... T>
 void print_message(fmt::format_string<T...> format, T&&... values) {
   print_message_text(fmt::format(format, std::forward<T>(values)...));
 }
-/// Closes stdout. Throws Error unless all output since the start was written; the disk may be full.
+/// Closes stdout. Throws Error if output was lost, for example because the disk is full.
 void close_stdout();
 
-/// Returns a message in one line, with control characters of names escaped: "a\nb".
+/// Returns a message in one line, with control characters escaped: a line break becomes \n.
 std::string printable(std::string_view message);
 
 }  // namespace pictura

@@ -44,7 +44,7 @@ std::optional<Decimal> parse_decimal(std::string_view text) {
     const bool is_negative = text.starts_with('-');
     take(&text, "+-");
     const std::string_view exponent = take_digits(&text);
-    constexpr std::size_t kMaxDigits = 6;  // larger exponents fit no number
+    constexpr std::size_t kMaxDigits = 6;  // no number has a larger exponent
     if (exponent.empty() || exponent.size() > kMaxDigits) return std::nullopt;
     std::from_chars(exponent.data(), exponent.data() + exponent.size(), result.exponent);
     if (is_negative) result.exponent = -result.exponent;
@@ -81,7 +81,7 @@ std::optional<double> parse_number(std::string_view text) {
   take(&text, "+");
   double value = 0;
   const auto parsed = std::from_chars(text.data(), text.data() + text.size(), value);
-  // Values between 0 and the smallest double are out of range for from_chars.
+  // from_chars() also reports values between 0 and the smallest double as out of range.
   if (parsed.ec != std::errc() || !std::isfinite(value)) return std::nullopt;
   return value;
 }

@@ -1,6 +1,6 @@
-// The only parser of numbers that people write: options of commands, overrides of configurations, names of maps.
-// Decimal numbers only, and integers in any decimal notation: 1000, 1e3, 1000.0 and 0010 are accepted; 0x10, 1_000, nan
-// and inf are not.
+// Parser of all numbers that users write: options of commands, overrides of configurations, names of maps. It accepts
+// only decimal numbers. Integers may have any decimal notation: 1000, 1e3, 1000.0 and 0010 are accepted; 0x10, 1_000,
+// nan and inf are not.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ std::optional<double> parse_number(std::string_view text);
 std::optional<uint64_t> parse_unsigned(std::string_view text);
 std::optional<int64_t> parse_integer(std::string_view text);
 
-/// Parses the whole text as a number that a program wrote, in any locale; accepts nan and inf.
+/// Parses the whole text as a number that a program wrote, regardless of the locale. Accepts nan and inf.
 std::optional<double> parse_written_number(std::string_view text);
 
 /// Whether a text, valid or not, is meant as a number: it begins with a digit, or with a sign or a point before a

@@ -36,7 +36,8 @@ std::string folder_of(const std::string& path) {
   return folder.empty() ? "." : folder;
 }
 
-// Whether the links of the folder are made by the kernel: they refer to an open file, which need not have that name.
+// Whether the folder is in /proc, where the kernel makes the links. Such a link refers to an open file, which may not
+// have the name that the link contains.
 bool is_in_proc(const std::string& folder) {
   struct statfs status{};
   return ::statfs(folder.c_str(), &status) == 0 && status.f_type == PROC_SUPER_MAGIC;
@@ -67,13 +68,15 @@ std::optional<int> descriptor_named(const std::string& target) {
 constexpr std::string_view kHiddenBeginning = ".pictura-", kHiddenEnding = ".tmp";
 constexpr size_t kHiddenDigits = 16;
 
-// Returns a name for a hidden file of the folder. The file must be created as a new one (O_EXCL, linkat).
+// Returns a random name for a hidden file in the folder. The caller must create the file as a new file (O_EXCL,
+// linkat).
 std::string new_hidden_name(const std::string& folder) {
   std::random_device random;
   return fmt::format("{}/{}{:08x}{:08x}{}", folder, kHiddenBeginning, random(), random(), kHiddenEnding);
 }
 
-// Removes hidden files of the folder whose writers have ended: a writer holds a lock until its process ends.
+// Removes those hidden files of the folder whose writers have ended. A writer locks its file until the writer's process
+// ends.
 void remove_abandoned(const std::string& folder) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
@@ -99,8 +102,8 @@ void write_all(int fd, std::string_view bytes, const std::string& path) {
   }
 }
 
-// Opens a target that is written through. A descriptor of this process keeps its position. A FIFO accepts writers only
-// after a reader has opened it, which a person may do later.
+// Opens a target that is written into and not replaced. If the target is a descriptor of this process, the descriptor
+// keeps its position. Waits for a FIFO's reader, because a user may start the reader later.
 int open_through(const std::string& target, const std::string& path) {
   if (const std::optional<int> own = descriptor_named(target)) {
     const int fd = ::fcntl(*own, F_DUPFD_CLOEXEC, 0);
@@ -132,7 +135,7 @@ void Descriptor::reset(int fd) {
 
 OutputFile::OutputFile(const std::string& path, Staging staging) : path_(path) {
   PICTURA_CHECK(!path.empty(), "expected the name of a file to write, got an empty one");
-  // System calls would end the name at the zero byte.
+  // A system call would read the name only up to the zero byte.
   PICTURA_CHECK(path.find('\0') == std::string::npos, "{}: expected the name of a file, got a name with a zero byte",
                 path.substr(0, path.find('\0')));
   struct stat status{};
@@ -141,7 +144,7 @@ OutputFile::OutputFile(const std::string& path, Staging staging) : path_(path) {
   target_ = without_links(path);
   is_through_ = exists && (!S_ISREG(status.st_mode) || is_in_proc(folder_of(target_)));
   if (exists && !is_through_) {
-    // A superuser passes faccessat(), so mode bits are checked too.
+    // faccessat() succeeds for a superuser, so mode bits are checked too.
     const bool is_read_only = (status.st_mode & (S_IWUSR | S_IWGRP | S_IWOTH)) == 0 ||
                               ::faccessat(AT_FDCWD, target_.c_str(), W_OK, AT_EACCESS) != 0;
     PICTURA_CHECK(!is_read_only, "{}: cannot be written: it is read-only", path);
@@ -156,7 +159,7 @@ OutputFile::~OutputFile() {
   if (!temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
-// Bytes for a device are staged with the temporary files, because a device has no folder of its own.
+// Bytes for a device are staged in the folder for temporary files, because files cannot be created next to a device.
 std::string OutputFile::staging_folder() const {
   if (!is_through_) return folder_of(target_);
   std::error_code error;
@@ -168,7 +171,7 @@ std::string OutputFile::staging_folder() const {
 
 void OutputFile::stage_unnamed() {
 #ifdef O_TMPFILE
-  constexpr const char* kNames = "/proc/self/fd";  // path by which replace() finds the file again
+  constexpr const char* kNames = "/proc/self/fd";  // replace() finds the file again by a path in this folder
   if (::access(kNames, X_OK) != 0) return;
   staged_.reset(::open(staging_folder().c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666));
   if (staged_.get() >= 0) ::flock(staged_.get(), LOCK_EX | LOCK_NB);
@@ -209,7 +212,7 @@ void OutputFile::write_through() {
 
 void OutputFile::replace() {
   if (replaced_) {
-    // Only a superuser can pass on owners, and only members can pass on groups.
+    // Only a superuser can set the owner, and only a member of a group can set the group. Failure is ignored.
     [[maybe_unused]] const int ignored = ::fchown(staged_.get(), replaced_->st_uid, replaced_->st_gid);
     constexpr mode_t kPermissions = S_IRWXU | S_IRWXG | S_IRWXO;
     struct stat staged{};
@@ -221,8 +224,8 @@ void OutputFile::replace() {
   // Synced before the rename, so that a crash never leaves an empty file under the final name.
   if (::fsync(staged_.get()) != 0) fail_to_write(path_);
   if (temporary_.empty()) {
-    // A link cannot replace an existing name, and a rename cannot move a file without a name. So the file first gets a
-    // hidden name and then the final name.
+    // linkat() cannot replace an existing name, and rename() cannot move a file without a name. So the file first gets
+    // a hidden name and then the final name.
     const std::string unnamed = fmt::format("/proc/self/fd/{}", staged_.get());
     while (temporary_.empty()) {
       const std::string name = new_hidden_name(folder_of(target_));

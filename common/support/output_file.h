@@ -1,5 +1,5 @@
-// The only writer of output files. Bytes go into a file without a name, and only a complete file gets a name. So a
-// reader never sees half a file, a full disk leaves the old file, and a killed process leaves nothing behind.
+// Writer of all output files. Bytes go into a file without a name, and only a complete file gets a name. So a reader
+// never sees half a file, a full disk leaves the old file unchanged, and a killed process leaves no file behind.
 #pragma once
 
 #include <optional>
@@ -27,8 +27,9 @@ class Descriptor {
   int fd_ = -1;
 };
 
-/// Storage of bytes before commit(): a file without a name wherever the file system allows it. Otherwise, and for
-/// tests, a hidden file beside the target; if its writer is killed, the next writer into that folder removes it.
+/// Storage of the bytes before commit(). unnamed: a file without a name, or `named` if the file system has no such
+/// files. named: a hidden file next to the target. If its writer is killed, the next writer in that folder removes the
+/// hidden file.
 enum class Staging { unnamed, named };
 
 /// Whether a name is that of a hidden file of Staging::named: .pictura-*.tmp with 16 random hexadecimal digits, unlike
@@ -37,10 +38,10 @@ bool is_temporary_name(std::string_view name);
 
 class OutputFile {
  public:
-  /// Opens a path for writing. Links are followed. Targets that are not regular files (devices, FIFOs), and targets of
-  /// links in /proc, such as /dev/stdout, are written through and never replaced. A replaced file passes on its mode
-  /// and, where possible, its owner. Throws Error naming the path for folders, read-only files and other targets that
-  /// cannot be written.
+  /// Opens a path for writing, and follows links. A target that is not a regular file (a device, a FIFO), or that a
+  /// link in /proc refers to (such as /dev/stdout), is never replaced: commit() writes into it. If a regular file is
+  /// replaced, the new file gets its mode and, where possible, its owner. Throws Error for folders, read-only files and
+  /// other targets that cannot be written; the message names the path.
   explicit OutputFile(const std::string& path, Staging staging = Staging::unnamed);
   /// Leaves the target unchanged unless commit() was called.
   ~OutputFile();
@@ -49,11 +50,12 @@ class OutputFile {
 
   /// Appends bytes. Throws Error naming the path when the disk is full.
   void write(std::string_view bytes);
-  /// Descriptor for other writers: open for reading and writing, always a seekable regular file.
+  /// Descriptor of the stored bytes, for code that writes to a descriptor. It is a seekable regular file, open for
+  /// reading and writing.
   int fd() const { return staged_.get(); }
 
-  /// Moves the written bytes to the target's place after syncing them to disk. Waits for a FIFO's reader. Throws Error
-  /// naming the path, and Interrupted if a signal ends the wait.
+  /// Syncs the stored bytes to disk and makes them the target's content. Waits for a FIFO's reader. Throws Error naming
+  /// the path, and Interrupted if a signal ends the wait.
   void commit();
 
  private:
@@ -65,7 +67,7 @@ class OutputFile {
 
   std::string path_;                     // as given by the caller, for messages
   std::string target_;                   // with links followed, except those of /proc
-  bool is_through_;                      // the target is written through
+  bool is_through_;                      // commit() writes into the target instead of replacing it
   std::optional<struct stat> replaced_;  // the file that commit() replaces
   std::string temporary_;                // the name of staged_, empty while it has none
   Descriptor staged_;

@@ -14,9 +14,9 @@ namespace pictura {
 
 namespace {
 
-// Time for which a thread polls for its next loop, or for the end of the others, before it sleeps. It is longer than
-// the gaps between the loops of a step, and far below a scheduler's time slice, which a spinning thread takes from
-// others.
+// Time for which a thread polls for its next loop, or for the end of the other threads, before it sleeps. It is longer
+// than the gaps between the loops of a simulation step. It is far below a scheduler's time slice, so that polling takes
+// little time from other processes.
 constexpr std::chrono::microseconds kSpinTime{50};
 
 void pause_briefly() {
@@ -39,7 +39,7 @@ void wait_while_equal(const std::atomic<std::uint32_t>& word, std::uint32_t valu
   word.wait(value, std::memory_order_acquire);
 }
 
-/// Worker threads of one thread, for its loops.
+/// Worker threads for the loops of one calling thread.
 class Team {
  public:
   Team() = default;
@@ -64,7 +64,7 @@ class Team {
       for (std::size_t i = 0; i < helpers; ++i) num_loops_.notify_one();
     }
     call(body, 0);
-    // No further threads may begin.
+    // From here on, no further threads may begin.
     std::uint32_t state = state_.fetch_and(kPlace - 1, std::memory_order_acq_rel) & (kPlace - 1);
     for (; state != 0; state = state_.load(std::memory_order_acquire)) wait_while_equal(state_, state);
   }
@@ -72,7 +72,7 @@ class Team {
  private:
   static constexpr std::uint32_t kPlace = 1 << 16;  // above the number of working threads
 
-  // Returns how many of `wanted` threads exist, because a system may have no more.
+  // Starts threads up to `wanted`, and returns how many exist, because the system may refuse to start more.
   std::size_t add_threads(std::size_t wanted) {
     try {
       while (threads_.size() < wanted) threads_.emplace_back([this] { work(); });
@@ -83,7 +83,7 @@ class Team {
 
   void work();
 
-  // Takes a place in the open loop, if any, and returns its number, else 0.
+  // If a loop has a free place, takes it and returns the number of the place; otherwise returns 0.
   int join_loop() {
     std::uint32_t state = state_.load(std::memory_order_acquire);
     while (state >= kPlace) {
@@ -96,9 +96,9 @@ class Team {
 
   std::vector<std::thread> threads_;
   std::atomic<bool> is_ending_ = false;
-  std::atomic<std::uint32_t> num_loops_ = 0;  // so far; threads without work sleep on it
+  std::atomic<std::uint32_t> num_loops_ = 0;  // number of loops so far; idle threads sleep until it changes
   std::atomic<std::uint32_t> state_ = 0;      // kPlace per free place in the loop, 1 per working thread
-  // Call of the current loop and its argument, which are set while no thread is working.
+  // Function of the current loop and its argument. They are set while no thread is working.
   void (*call_)(void*, int) = nullptr;
   void* body_ = nullptr;
 };
@@ -121,7 +121,7 @@ void Team::work() {
 }
 
 Team& team_of_this_thread() {
-  // A forked process has no worker threads: it abandons the team and starts its own.
+  // A forked process has no worker threads, so it abandons this team and starts its own team.
   static const int at_fork = pthread_atfork(nullptr, nullptr, [] { static_cast<void>(own_team.release()); });
   static_cast<void>(at_fork);
   if (!own_team) own_team = std::make_unique<Team>();

@@ -1,5 +1,5 @@
-// Writer of the protocol buffers' wire format: a varint (field << 3 | kind), then the value. Numbers are stored as in
-// memory, which is little-endian.
+// Writer of the wire format of Protocol Buffers. A field is a varint (field << 3 | wire type), followed by the value.
+// Numbers are stored as in memory, which must be little-endian.
 #pragma once
 
 #include <bit>
@@ -41,7 +41,7 @@ void append_float(Field field, float value, std::string* out) {
   out->append(bytes_of(value));
 }
 
-/// Appends bytes: a text, packed numbers, or a message that was written before.
+/// Appends bytes: a text, packed numbers, or the bytes of a nested message.
 template <typename Field>
 void append_bytes(Field field, std::string_view bytes, std::string* out) {
   append_varint(static_cast<uint64_t>(field) << 3 | 2, out);

@@ -1,5 +1,5 @@
-// Refuses files that are not regular before a text is read as a whole. Opening a FIFO would wait for its writer, and
-// signals could not stop the wait, since they are polled only between steps.
+// Check that a file is regular, for code that reads a text as a whole. Opening a FIFO would wait for its writer, and ^C
+// could not end the wait, because signals are polled only between steps of work.
 #pragma once
 
 #include <filesystem>
@@ -9,8 +9,8 @@
 
 namespace pictura {
 
-/// Throws Error naming the path if it is a FIFO, a socket or a device. Missing files and folders are left to the
-/// reader.
+/// Throws Error naming the path if it is a FIFO, a socket or a device. Accepts missing files and folders, because
+/// reading them reports an error.
 inline void require_regular_file(const std::string& path) {
   std::error_code ignored;
   const std::filesystem::file_status status = std::filesystem::status(path, ignored);

@@ -10,7 +10,8 @@ namespace pictura {
 /// A library that stays open for the rest of the process: drivers do not survive being unloaded.
 class SharedLibrary {
  public:
-  /// Throws Error "renderer RENDERER: cannot open FILE (SOURCE): reason"; `source` says where to get the library.
+  /// Throws Error "renderer RENDERER: cannot open FILE (SOURCE): reason"; `source` tells users where to get the
+  /// library.
   SharedLibrary(const std::string& renderer, const std::string& file, const std::string& source);
   /// Returns the address of a function. Throws Error naming the function.
   void* function(const char* name) const;

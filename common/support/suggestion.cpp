@@ -17,7 +17,7 @@ std::string lower(std::string_view word) {
   return result;
 }
 
-// Damerau-Levenshtein distance, in the variant in which no letter is changed twice.
+// Damerau-Levenshtein distance, in the variant that changes no letter twice (optimal string alignment).
 std::size_t distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> before_last(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -38,7 +38,7 @@ std::size_t distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string nearest_word(std::string_view word, const std::vector<std::string>& known) {
-  constexpr std::size_t kMaxLetters = 100;  // maximum length of a name; the time grows with its square
+  constexpr std::size_t kMaxLetters = 100;  // maximum length of a word; the time grows with its square
   if (word.empty() || word.size() > kMaxLetters) return "";
   std::string nearest;
   std::size_t minimum = word.size();

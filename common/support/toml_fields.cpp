@@ -23,7 +23,7 @@ std::optional<int64_t> whole_number(const toml::node& node) {
   if (node.is_integer()) return node.as_integer()->get();
   if (!node.is_floating_point()) return std::nullopt;
   const double number = node.as_floating_point()->get();
-  constexpr double kExact = 9007199254740992;  // above, a double represents several integers
+  constexpr double kExact = 9007199254740992;  // above this, a double no longer represents every integer
   if (!(std::abs(number) <= kExact) || number != std::floor(number)) return std::nullopt;
   return static_cast<int64_t>(number);
 }

@@ -1,5 +1,6 @@
-// Strict reader of TOML: the reader asks for every key by name, type and range, and refuses all other keys. Messages
-// name the file, the line, the table and the key. Not installed: users of the headers do not need toml++.
+// Strict reader of TOML: code asks for each key by name, type and range, and all other keys are errors. Messages name
+// the file, the line, the table and the key. This header is not installed, so that users of the library do not need
+// toml++.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +26,8 @@ std::optional<int64_t> whole_number(const toml::node& node);
 /// Formats a value for messages, in one short line.
 std::string format_value(const toml::node& node);
 
-/// One table. Readers with a fallback return the fallback if the key is missing; other readers throw Error. All readers
-/// throw Error for a wrong type or range. The table must outlive the object.
+/// Reader of one table. If a key is missing, functions with a fallback return the fallback, and other functions throw
+/// Error. All functions throw Error for a wrong type or range. The table must outlive the object.
 class TomlFields {
  public:
   struct Range {
@@ -45,7 +46,7 @@ class TomlFields {
   int integer(std::string_view key, Range range, int fallback);
   bool flag(std::string_view key, bool fallback);
   std::string text(std::string_view key, const std::string& fallback);
-  /// Reads a text that may be part of a file name: letters, digits, '-' and '_', at most 64.
+  /// Reads a text that may be part of a file name: at most 64 letters, digits, '-' and '_'.
   std::string file_name(std::string_view key, const std::string& fallback);
   /// Reads a text and returns its index in `names`. A fallback of -1 makes the key mandatory.
   int choice(std::string_view key, Span<const std::string_view> names, int fallback = -1);
@@ -57,9 +58,9 @@ class TomlFields {
   /// Returns the [[key]] tables; empty if there are none.
   std::vector<TomlFields> tables(std::string_view key);
 
-  /// Throws for the first unread key; call after all keys were read.
+  /// Throws Error for the first key that was not read. Call it after reading all keys.
   void reject_unknown_keys() const;
-  /// Throws "file:line: table: key: message".
+  /// Throws an Error "file:line: table: key: message".
   [[noreturn]] void throw_error(std::string_view key, std::string_view message) const;
 
  private:
