@@ -1,4 +1,4 @@
-// Rules of the learner on the host, as plain loops.
+// Executor of a learner on the host: the rules of learning as plain loops.
 #include <algorithm>
 #include <memory>
 #include <vector>

@@ -136,8 +136,8 @@ bool ImageDrawer::stands(uint32_t solid, uint32_t strip) const {
   return stands_on(extent_of(solid, pieces, agents), extent_of(strip, pieces, agents));
 }
 
-// Calls visit(y, row, spans, lane) for each row of a face within `rows`. `row` is the index of its first pixel, and the
-// row's span is in lane `lane` of `spans`.
+// Calls visit(y, row, spans, lane) for each row y of a face within `rows`. `row` is the index of the row's first pixel.
+// Lane `lane` of `spans` is the row's span.
 template <typename Visit>
 void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& visit) const {
   const int width = setting_.camera.width_px;
@@ -150,7 +150,7 @@ void ImageDrawer::visit_spans(const ScreenFace& face, RowRange rows, Visit&& vis
   }
 }
 
-// Finds, for each pixel of the rows, the largest occluder_bound() of the faces that cover it fully.
+// Finds, for each pixel of the rows, the largest occluder_bound() of the faces that cover the pixel fully.
 void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
   occluder_bounds_.assign((rows.y_end - rows.y_begin) * setting_.camera.width_px + kLanes, 0.0f);
   for (int32_t f = faces.begin; f < faces.end; ++f) {
@@ -165,7 +165,7 @@ void ImageDrawer::find_occluder_bounds(FaceRange faces, RowRange rows) {
   }
 }
 
-// Rasterizes faces into fragments, a linked list per pixel of the rows.
+// Rasterizes faces into fragments, which form one linked list per pixel of the rows.
 void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
   find_occluder_bounds(faces, rows);
   first_fragment_.assign((rows.y_end - rows.y_begin) * setting_.camera.width_px, -1);
@@ -193,7 +193,7 @@ void ImageDrawer::make_fragments(FaceRange faces, RowRange rows) {
     };
     visit_spans(face, rows, [&](int y, int row, const RowSpansX8& spans, int lane) {
       for (int x = spans.begin[lane]; x < spans.end[lane]; x += kLanes) {
-        // Room for the pixels of a step and the earlier partial pixels.
+        // Makes room for the pixels of this step and for the partial pixels of earlier steps.
         if (static_cast<std::size_t>(num_fragments) + 2 * kLanes > fragments_.size()) {
           fragments_.resize(2 * fragments_.size() + 2 * kLanes);
         }
@@ -220,7 +220,8 @@ void ImageDrawer::collect_fragments(int32_t first) {
   for (int32_t i = first; i >= 0; i = fragments_[i].next) collected_.push_back(fragments_[i]);
 }
 
-// Collects the fragments of the pixels that have several, pixel by pixel, and finds their visible samples.
+// Collects the fragments of all pixels with more than one fragment, pixel by pixel, and finds the fragments' visible
+// samples.
 void ImageDrawer::resolve_occlusion(RowRange rows) {
   collected_.clear();
   visible_.clear();
@@ -263,7 +264,8 @@ void ImageDrawer::resolve_occlusion(RowRange rows) {
       for (std::size_t i = begin; i < end; ++i) {
         const PixelCoverage a = collected_[i].coverage;
         for (std::size_t j = i + 1; j < end; ++j) {
-          // Without a branch, which would be mispredicted: the next pair overwrites a pair that shares nothing.
+          // There is no branch, because it would often be mispredicted. Instead, the next pair overwrites a pair that
+          // shares nothing.
           const uint64_t shared = shared_samples(a, collected_[j].coverage);
           pair[num_pairs] = {i, j};
           pairs.shared[num_pairs] = shared;
@@ -319,10 +321,10 @@ void ImageDrawer::draw(const ImageTarget& target) {
   const int width = setting_.camera.width_px, height = setting_.camera.height_px;
   const int band_rows = max_of(1, min_of(height, kBandPixels / width));
   const bool in_patches = target.order == ChannelOrder::patches;
-  // Distance between channels of a pixel.
+  // Distance, in values, between the channels of a pixel.
   const int64_t step = in_patches ? place_in_patches(target.patch_px, width, 1, 0, 0) : int64_t{width} * height;
   const bool has_bytes = target.format == PixelFormat::u8 || target.format == PixelFormat::bf16;
-  // Colours of byte formats are rounded first, since kernels store them as bytes.
+  // For formats with the values of bytes, colours are first rounded, because kernels store them as bytes.
   auto shown = [&](Rgb color, int x, int y) {
     return target.effect.of(has_bytes ? rgb_of_bytes(to_bytes(color)) : color, x, y);
   };
@@ -358,8 +360,8 @@ void ImageDrawer::draw(const ImageTarget& target) {
   if (target.depth_m || target.class_id || target.instance_id) draw_planes(target);
 }
 
-// Orders the collected fragments of a pixel front to back: the next is the nearest fragment that no remaining fragment
-// occludes; in a cycle, the nearest.
+// Orders the collected fragments of a pixel from front to back. The next fragment is the nearest of those that no
+// remaining fragment occludes; in a cycle, it is the nearest fragment.
 void ImageDrawer::order_pixel(int x, int y) {
   auto at_centroid = [&](const PixelFragment& fragment) {
     return make_fragment(faces_[fragment.face], fragment.face, fragment.coverage, x, y);

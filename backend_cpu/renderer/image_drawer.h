@@ -1,6 +1,6 @@
-// Drawing of one image: sets up the faces of all primitives that may be visible, rasterizes them into fragments, and
-// composites each pixel. The rules are those of common/raster, shared with the kernels. This class adds only the
-// traversal and the memory, which is reused from image to image.
+// Drawing of one image. It sets up the faces of all primitives that may be visible, rasterizes the faces into fragments
+// (the part of a pixel that one face covers), and composites each pixel. The rules of drawing are in common/raster,
+// which CUDA kernels share. ImageDrawer adds only the order of the work and the memory, which all images reuse.
 #pragma once
 
 #include <functional>
@@ -21,8 +21,8 @@ struct ImageRequest {
   PinholeCamera camera;  // in the world
   float line_floor_px = 0;
   bool debug_palette = false;
-  bool culls_occluded = true;    // drop faces behind the solids that cover most of the image
-  const Crowd* crowd = nullptr;  // crowd of the view's world; null: every box is tested
+  bool culls_occluded = true;    // drop faces behind the boxes and walls that cover most of the image
+  const Crowd* crowd = nullptr;  // sorted boxes of the view's world; null: every box is tested
 };
 
 /// Outputs of one image.
@@ -37,7 +37,7 @@ struct ImageTarget {
   ImageEffect effect;
 };
 
-/// Draws images in sequence. An object serves one thread.
+/// Draws one image at a time. An object must be used by one thread only.
 class ImageDrawer {
  public:
   /// Sets up the faces of an image.
@@ -46,10 +46,11 @@ class ImageDrawer {
   const Occluders& occluders() const { return setting_.occluders; }
   /// Draws the prepared image.
   void draw(const ImageTarget& target);
-  /// Adds an agent's visible weights in the prepared image, among all other agents and alone.
+  /// Adds the visible weight of an agent in the prepared image to sum_inout: once among all primitives, and once as if
+  /// the agent were alone.
   void accumulate_visibility(int32_t agent, VisibilitySum* sum_inout);
   /// Calls visit(y * width + x, coverage, colour) for each fragment of each pixel of the prepared image, front to back.
-  /// For measurements of other compositing methods.
+  /// Benchmarks use it to measure other methods of compositing.
   void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit);
 
  private:
@@ -67,7 +68,7 @@ class ImageDrawer {
     std::vector<PolygonEdge> edges_;
   };
 
-  // A face's coverage of a pixel, and the index of the pixel's next fragment.
+  // A fragment: a face's coverage of a pixel. It is an element of the list of the pixel's fragments.
   struct PixelFragment {
     PixelCoverage coverage;
     int32_t face;
@@ -82,7 +83,7 @@ class ImageDrawer {
     CameraQuad in_camera;
   };
 
-  // A solid's face on screen that may occlude others.
+  // The face of a solid on screen, which may occlude other faces.
   struct OccludingFace {
     const Solid* solid = nullptr;
     float covered_px2 = 0;
@@ -113,8 +114,8 @@ class ImageDrawer {
   void collect_fragments(int32_t first);
   void order_pixel(int x, int y);
   void resolve_occlusion(RowRange rows);
-  // Composites the pixels of the rows: visit(pixel index, fragment, weight) for each fragment, then finish(pixel index,
-  // color) for each pixel.
+  // Composites the pixels of the rows. For each pixel, calls visit(pixel index, fragment, weight) for each fragment,
+  // then finish(pixel index, colour).
   template <typename Visit, typename Finish>
   void composite_rows(RowRange rows, Visit&& visit, Finish&& finish);
   void draw_planes(const ImageTarget& target) const;
@@ -134,7 +135,7 @@ class ImageDrawer {
   std::vector<PixelFragment> fragments_;
   std::vector<PixelFragment> collected_;
   std::vector<uint64_t> visible_;                  // visible samples of each collected fragment
-  std::vector<std::size_t> pixel_ends_;            // end of each pixel's fragments among the collected fragments
+  std::vector<std::size_t> pixel_ends_;            // for each pixel, the end of its fragments in collected_
   std::vector<PixelAccumulator::Weight> weights_;  // weights of one pixel's fragments
 };
 

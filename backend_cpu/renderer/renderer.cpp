@@ -1,5 +1,5 @@
-// The CPU renderer, which is the reference (oracle) of all other renderers: checks its input, places the cameras, and
-// distributes images over threads.
+// The CPU renderer, which is the reference (oracle) for all other renderers. It checks its input, places the cameras,
+// and distributes images over threads.
 #include <cstddef>
 #include <memory>
 #include <vector>
@@ -74,7 +74,7 @@ class CpuRenderer final : public Renderer {
       const bool is_drawn = static_cast<std::size_t>(query.view) < views.size();
       for (std::size_t camera = 0; is_drawn && camera < cameras_.size(); ++camera) {
         ImageRequest image = request(scene, views[query.view], camera);
-        image.culls_occluded = false;  // occluded faces count when the agent is drawn alone
+        image.culls_occluded = false;  // occluded faces of the agent count in its weight alone
         drawer.prepare(image);
         drawer.accumulate_visibility(query.agent, &seen);
       }
@@ -85,7 +85,7 @@ class CpuRenderer final : public Renderer {
  private:
   int num_threads() const { return static_cast<int>(drawers_.size()); }
 
-  // Sorts the boxes of worlds in which testing all boxes in every image would take longer.
+  // Sorts the boxes of those worlds in which testing all boxes in every image would take longer than sorting.
   void sort_crowds(const SceneBatch& scene, Span<const View> views) {
     constexpr int32_t kMinBoxes = 256, kMinViews = 16;
     std::vector<int32_t> num_views(scene.geometry.size());
@@ -131,7 +131,7 @@ class CpuRenderer final : public Renderer {
   std::vector<PinholeCamera> cameras_;  // in the ego frame
   HostGeometries geometries_;
   std::vector<std::unique_ptr<const CulledGeometry>> culled_;  // [handle]
-  std::vector<std::unique_ptr<const Crowd>> crowds_;           // [worlds of the scene] null: not sorted
+  std::vector<std::unique_ptr<const Crowd>> crowds_;           // [worlds of the scene]; null if not sorted
   std::vector<ImageDrawer> drawers_;                           // one per thread
 };
 

@@ -1,4 +1,5 @@
-// The simulator's oracle: the rules of simulator/rules/ run world by world on host threads.
+// The CPU simulator, which is the reference (oracle) for other simulators. It applies the rules of simulator/rules/
+// world by world, on host threads.
 #include "pictura/simulator/simulator.h"
 
 #include <algorithm>
@@ -17,7 +18,8 @@
 namespace pictura {
 namespace {
 
-/// Sorts the boxes with a place into their cells, by counting; in ascending order within a cell.
+/// Sorts the boxes that are in the world into cells, by a counting sort. Within a cell, the boxes are in ascending
+/// order.
 void sort_into_cells(const WorldView& world, CellLists* cells_inout) {
   std::vector<int32_t>& begin = cells_inout->begin;
   const GridView cells = cells_inout->view();
@@ -87,7 +89,7 @@ class SimulatorCpu final : public Simulator {
     const auto* copy = dynamic_cast<const HostSnapshot*>(&snapshot);
     PICTURA_CHECK(copy && copy->worlds == worlds_token_,
                   "restore: expected a snapshot of these worlds of this simulator");
-    worlds_.state = copy->state;  // copied, so that arrays keep their memory
+    worlds_.state = copy->state;  // copied instead of moved, so that arrays keep their memory
     publish_restored();
   }
 
@@ -211,7 +213,7 @@ class SimulatorCpu final : public Simulator {
     return arrays_.results;
   }
 
-  /// Checks commands before anything changes, so that a refused step leaves the state unchanged.
+  /// Checks commands before the step changes anything, so that a refused step leaves the state unchanged.
   template <typename CommandType>
   void check_commands(Span<const CommandType> commands) {
     for (int w = 0; w < worlds_.setup.num_worlds(); ++w) {
@@ -238,7 +240,7 @@ class SimulatorCpu final : public Simulator {
     worlds_.state.episode_over[index] = 0;
     const WorldView world = worlds_.world(w);
     for (int light = 0; light < static_cast<int>(world.map.stop_lines.size()); ++light) begin_light(world, light);
-    // The cells hold chains until all boxes are placed.
+    // Until all boxes are placed, the cells hold linked lists of boxes.
     CellLists& cells = worlds_.box_cells[index];
     const BoxChains standing{cells.view(), cells.begin.data(), cells.items.data()};
     std::fill(cells.begin.begin(), cells.begin.end(), -1);
@@ -260,7 +262,8 @@ class SimulatorCpu final : public Simulator {
                      }));
       add(world.num_agents + car);
     }
-    // All agents choose before any is placed, since a placed agent takes the height of its road.
+    // All agents choose their places before any agent is placed, because placing sets an agent's height to that of its
+    // road.
     for (int agent = 0; agent < world.num_agents; ++agent) {
       draw_agent(world, agent);
       const int chosen = first_try(has_places(world, agent), [&](int i) {
@@ -282,7 +285,7 @@ class SimulatorCpu final : public Simulator {
     sort_into_cells(world, &worlds_.box_cells[index]);
   }
 
-  /// Returns the first try that succeeds; -1 if none succeeds or there are no places.
+  /// Returns the number of the first try that succeeds, or -1 if no try succeeds or there are no places.
   template <typename Succeeds>
   static int first_try(bool has_places, Succeeds&& succeeds) {
     for (int i = 0; has_places && i < kSpawnTries; ++i) {

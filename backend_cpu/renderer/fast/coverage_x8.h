@@ -1,4 +1,4 @@
-// Rules of common/raster/coverage.h for eight rows or pixels at once.
+// The functions of common/raster/coverage.h for eight rows or eight pixels in parallel (SIMD).
 #pragma once
 
 #include <bit>
@@ -56,14 +56,15 @@ inline RowSpansX8 row_spans_x8(const PolygonEdge* edges, int count, const PixelB
   return spans;
 }
 
-/// Calls visit(lane, coverage) for each pixel with a nonzero pixel_coverage() among the first num_pixels of the eight.
+/// Computes pixel_coverage() for the first num_pixels of eight pixels. Calls visit(lane, coverage) for each of them
+/// whose coverage is not empty.
 #if defined(__AVX2__)
 template <typename Visit>
 inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, const int32_t* x, const int32_t* y,
                         int num_pixels, Visit&& visit) {
   const Float8 x_px = load8_integers(x), y_px = load8_integers(y);
   constexpr int kPairs = kLanes / 2;
-  // Element i has the columns of pixels i and i + 4.
+  // Element i holds the sample columns of pixels i and i + 4.
   __m256i low[kPairs], high[kPairs];
   for (int i = 0; i < kPairs; ++i) {
     low[i] = _mm256_set1_epi16(-kFar_units);

@@ -1,5 +1,5 @@
-// Culling of eight pieces of a map at once: the rules of common/raster/cull.h, with the bounding balls of the pieces in
-// the order of a grid's items.
+// Culling of eight pieces of a map in parallel (SIMD), by the rules of common/raster/cull.h. The bounding balls of the
+// pieces are stored in the order of a grid's items.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,7 @@ class BallGrid {
     Vec3 middle_m;
     float radius_m = 0;
   };
-  /// ball_of(item) is the item's ball, and box_of(item) the box by which the item was put into the grid.
+  /// ball_of(item) must return the item's bounding ball, and box_of(item) the box with which the grid was built.
   template <typename BallOf, typename BoxOf>
   BallGrid(const GridView& grid, BallOf&& ball_of, BoxOf&& box_of) : grid_(grid) {
     const std::size_t padded = grid.items.size() + kLanes;
@@ -58,13 +58,13 @@ class BallGrid {
     }
   }
 
-  /// Calls visit(item) for each item that for_each_item() visits in a box on the ground and whose ball is in the
-  /// frustum, in the same order.
+  /// Calls visit(item) for each item that for_each_item() would visit for query_box and whose ball is in the frustum.
+  /// The order is that of for_each_item().
   template <typename Visit>
   void visit_visible(const PinholeCamera& camera, const Frustum& f, const Aabb2& query_box, Visit&& visit) const {
     const CellRange cells = cells_of(grid_, query_box);
     for (int y = cells.y_begin; y < cells.y_end; ++y) {
-      // An item is visited in the first column and the first row that it has in common with the box.
+      // An item is visited only in the first of the query's columns and rows that contain the item.
       const int32_t first_column_end = begin(cells.x_begin + 1, y), row_end = begin(cells.x_end, y);
       const int row_starts = y == cells.y_begin ? kStartsRow : 0;
       for (int32_t i = begin(cells.x_begin, y); i < row_end; i += kLanes) {
@@ -82,7 +82,7 @@ class BallGrid {
 
  private:
   static constexpr int kStartsColumn = 1, kStartsRow = 2;
-  // Index of the first item of a cell; x = num_x means the next row.
+  // Index of the first item of a cell. If x is num_x, it is the first item of the next row.
   int32_t begin(int x, int y) const {
     return grid_
         .begin[static_cast<std::size_t>(y) * static_cast<std::size_t>(grid_.num_x) + static_cast<std::size_t>(x)];
@@ -91,10 +91,10 @@ class BallGrid {
   GridView grid_;
   // Centres and radii of the grid's items, padded by one vector.
   std::vector<float> x_m_, y_m_, z_m_, radius_m_;
-  std::vector<uint8_t> starts_;  // whether the item's box begins in the column and row of this cell
+  std::vector<uint8_t> starts_;  // bits: whether the item's box begins in this cell's column, and in its row
 };
 
-/// Balls by the cells of their centres, for finding all balls that a frustum may contain.
+/// Bounding balls, sorted by the cells of their centres. It finds the balls that are in a frustum.
 class CenteredBalls {
  public:
   explicit CenteredBalls(const std::vector<BallGrid::Ball>& balls)
@@ -107,7 +107,7 @@ class CenteredBalls {
   CenteredBalls(const CenteredBalls&) = delete;
   CenteredBalls& operator=(const CenteredBalls&) = delete;
 
-  /// Writes the indices of the balls that sphere_in_frustum() passes, in ascending order.
+  /// Writes the indices of the balls for which sphere_in_frustum() is true, in ascending order.
   void find_visible(const PinholeCamera& camera, const Frustum& f, std::vector<int32_t>* found_out) const {
     found_out->clear();
     const Aabb2 box = ground_box_of_spheres(camera, f, largest_radius_m_);
@@ -117,7 +117,7 @@ class CenteredBalls {
   }
 
  private:
-  /// Clamps positions beyond any map to the outermost cells.
+  /// Clamps positions that are far outside any map, so that the grid stays small.
   static Vec2 within_bounds(Vec2 p) {
     constexpr float kBound_m = 1e6f;
     return {clamp(p.x, -kBound_m, kBound_m), clamp(p.y, -kBound_m, kBound_m)};
@@ -144,11 +144,11 @@ class CenteredBalls {
   float largest_radius_m_ = 0;
 };
 
-/// Drawn boxes of a world with many agents, by cells.
+/// Drawn boxes of a world with many agents, sorted by cells.
 class Crowd {
  public:
   explicit Crowd(Span<const AgentBox> boxes) : agents_(drawn(boxes)), balls_(balls_of(boxes, agents_)) {}
-  /// Writes the indices of the boxes that may_be_visible() passes, in ascending order.
+  /// Writes the indices of the boxes for which may_be_visible() is true, in ascending order.
   void find_visible(const PinholeCamera& camera, const Frustum& f, std::vector<int32_t>* found_out) const {
     balls_.find_visible(camera, f, found_out);
     for (int32_t& found : *found_out) found = agents_[found];
@@ -172,7 +172,7 @@ class Crowd {
   CenteredBalls balls_;
 };
 
-/// A geometry with the bounding balls of its pieces.
+/// A geometry with the bounding balls of its strips, walls and light heads.
 struct CulledGeometry {
   /// The view's arrays must outlive the object.
   explicit CulledGeometry(const StaticGeometryView& geometry)

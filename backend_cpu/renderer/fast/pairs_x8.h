@@ -1,4 +1,4 @@
-// Order of eight pairs of fragments at once: the rules of common/raster/visibility.h.
+// Order of eight pairs of fragments in parallel (SIMD), by the rules of common/raster/visibility.h.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@ struct PairsX8 {
   const ScreenFace* a[kLanes];
   const ScreenFace* b[kLanes];
   alignas(32) uint64_t shared[kLanes];  // see shared_samples(); not 0
-  alignas(32) float x[kLanes];          // the pixels' corners
+  alignas(32) float x[kLanes];          // corners of the pixels
   alignas(32) float y[kLanes];
 };
 
@@ -35,7 +35,7 @@ inline Vec2x8 centroid_of_x8(const uint64_t* samples) {
 /// Members of eight faces that determine their order.
 struct FacesX8 {
   Float8 inverse_depth_x, inverse_depth_y, inverse_depth_0, inverse_depth_low, inverse_depth_high, plane_distance_m;
-  Float8 object_id;  // its bits
+  Float8 object_id;  // as the bits of a float
 
   explicit FacesX8(const ScreenFace* const* face) {
     Float8 from_x[4], from_low[4];
@@ -55,7 +55,7 @@ struct FacesX8 {
   Mask8 are_strips() const { return ~less_bits(object_id, float_from_bits(kStripKind << kKindShift)); }
 
  private:
-  // Loads the four members of each face from an offset on.
+  // Loads the four members of each face that begin at kOffset.
   template <std::size_t kOffset>
   static void load_four(const ScreenFace* const* face, Float8* members_out) {
     static_assert(offsetof(ScreenFace, object_id) == offsetof(ScreenFace, inverse_depth_x) + 3 * sizeof(float));
@@ -66,9 +66,9 @@ struct FacesX8 {
   }
 };
 
-/// Order of eight pairs. `a_first`: lanes in which a is in front of b at all shared samples. `undecided`: lanes that
-/// occlude_pair() must decide, namely pairs of one primitive, pairs that change places, and solids that may stand on a
-/// strip.
+/// Order of eight pairs, as bit masks of lanes. `a_first`: a is in front of b at all shared samples. `undecided`:
+/// occlude_pair() must decide, because the faces belong to one primitive, may intersect in the pixel, or are a solid
+/// and a strip on which it may stand.
 struct PairOrder {
   unsigned a_first = 0, undecided = 0;
 };

@@ -1,5 +1,5 @@
-// Set-up of eight strips at once, up to their edges: the rules of common/raster, from strip_quad() to
-// is_quad_visible().
+// Set-up of eight strips in parallel (SIMD), by the rules of common/raster from strip_quad() to is_quad_visible(). It
+// does not make the strips' edges.
 #pragma once
 
 #include <cstddef>
@@ -9,9 +9,9 @@
 
 namespace pictura {
 
-/// Eight strips in the image.
+/// Eight strips on screen.
 struct StripsX8 {
-  unsigned visible = 0;   // lanes of strips that need no clipping, are large enough and not occluded
+  unsigned visible = 0;   // lanes of strips that need no clipping, are large enough and are not occluded
   unsigned crossing = 0;  // lanes of strips that must be clipped first
   unsigned clockwise = 0;
   Vec2x8 corner[4];
@@ -99,7 +99,7 @@ inline StripsX8 set_up_strips(const ImageSetting& setting, const Strip* const* s
   const Vec3x8 a_m{member[0], member[1], member[2]}, b_m{member[3], member[4], member[5]};
   const Float8 half_width_m = 0.5f * member[10];
 
-  // strip_corners() in camera coordinates, as quad_to_camera().
+  // strip_corners() and quad_to_camera()
   const Vec2x8 at_a = Vec2x8{member[6], member[7]} * half_width_m, at_b = Vec2x8{member[8], member[9]} * half_width_m;
   const Vec3x8 corner[4] = {to_camera(camera, {a_m.x + at_a.x, a_m.y + at_a.y, a_m.z}),
                             to_camera(camera, {a_m.x - at_a.x, a_m.y - at_a.y, a_m.z}),

@@ -1,4 +1,4 @@
-// Eight vectors at once, one per lane, with the arithmetic of Vec2 and Vec3 (common/math.h).
+// Eight vectors in parallel, one per SIMD lane, with the arithmetic of Vec2 and Vec3 (common/math.h).
 #pragma once
 
 #include "pictura/common/portable/float8.h"
