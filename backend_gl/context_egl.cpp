@@ -1,5 +1,5 @@
-// OpenGL through EGL without a window system: the driver of NVIDIA or another vendor on a GPU, else Mesa's surfaceless
-// platform.
+// OpenGL through EGL without a window system: on a GPU with the driver of NVIDIA or another vendor, else on Mesa's
+// surfaceless platform.
 #include <string_view>
 #include <vector>
 
@@ -44,7 +44,7 @@ class Egl {
   decltype(&eglMakeCurrent) make_current = function<decltype(make_current)>("eglMakeCurrent");
   decltype(&eglQueryAPI) query_api = function<decltype(query_api)>("eglQueryAPI");
   decltype(&eglQueryString) query_string = function<decltype(query_string)>("eglQueryString");
-  // Extensions; null if they are missing.
+  // Functions of extensions; null if the extension is missing.
   PFNEGLQUERYDEVICESEXTPROC query_devices = extension<decltype(query_devices)>("eglQueryDevicesEXT");
   PFNEGLQUERYDEVICESTRINGEXTPROC query_device_string =
       extension<decltype(query_device_string)>("eglQueryDeviceStringEXT");
@@ -75,7 +75,7 @@ bool is_gpu(const Egl& egl, EGLDeviceEXT device) {
   return !has(egl.query_device_string(device, EGL_EXTENSIONS), "EGL_MESA_device_software");
 }
 
-// Opens the display, which the whole process shares, so that it is never terminated.
+// Opens the display. It is never terminated, because the whole process shares it.
 EGLDisplay open_display(const Egl& egl, int cuda_device) {
   auto initialized = [&](EGLenum platform, void* native) {
     const EGLDisplay display = egl.get_platform_display(platform, native, nullptr);
@@ -116,7 +116,7 @@ class EglContext final : public Context {
   void* entry_point(const char* name) const override { return reinterpret_cast<void*>(egl_.get_proc_address(name)); }
 
   void enter() override {
-    // EGL returns the current context of the bound API, which is per thread.
+    // EGL returns the current context of the bound API. The bound API belongs to the thread.
     before_ = {egl_.query_api(), egl_.get_current_display(), egl_.get_current_context(),
                egl_.get_current_surface(EGL_DRAW), egl_.get_current_surface(EGL_READ)};
     if (egl_.bind_api(EGL_OPENGL_API) && egl_.make_current(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_)) return;

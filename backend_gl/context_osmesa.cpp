@@ -1,4 +1,5 @@
-// OpenGL through Mesa's off-screen interface: a software rasterizer in the calling process, without display and device.
+// OpenGL through Mesa's off-screen interface: a software rasterizer in the calling process, which needs no display or
+// device.
 #include <GL/osmesa.h>
 
 #include "pictura/backend_gl/gl_context.h"

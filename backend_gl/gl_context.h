@@ -1,5 +1,5 @@
-// OpenGL contexts of OSMesa or EGL, without any OpenGL header. Their libraries are loaded when a context is created and
-// never linked, so that the program starts without them.
+// OpenGL contexts of OSMesa or EGL; this header includes no OpenGL header. The libraries are loaded when a context is
+// created and are never linked, so that the program also starts on machines without them.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,7 @@ class Context {
   Context(const Context&) = delete;
   Context& operator=(const Context&) = delete;
 
-  /// Name of the context: "gl:osmesa" or "gl:egl".
+  /// Name of the renderer on this context: "gl:osmesa" or "gl:egl".
   virtual std::string name() const = 0;
   /// Address of an OpenGL function, or null.
   virtual void* entry_point(const char* name) const = 0;
@@ -30,12 +30,12 @@ class Context {
 /// Makes a context of OSMesa. Throws Error if libOSMesa or its context is missing.
 std::unique_ptr<Context> make_osmesa_context();
 
-/// Makes a context without any window system: on a GPU if EGL offers one, else with Mesa's software rasterizer. Among
-/// several GPUs, it uses the one with CUDA's index cuda_device, unless that is -1. Throws Error if libEGL, the device
-/// or its context is missing.
+/// Makes a context without a window system: on a GPU if EGL offers a GPU, else with Mesa's software rasterizer. If
+/// cuda_device is not -1, it uses the GPU with this CUDA device index. Throws Error if libEGL, the device or its
+/// context is missing.
 std::unique_ptr<Context> make_egl_context(int cuda_device = -1);
 
-/// Makes a context current for its own lifetime.
+/// Makes a context current during the lifetime of this object.
 class CurrentContext {
  public:
   explicit CurrentContext(Context* context) : context_(context) { context_->enter(); }

@@ -1,5 +1,5 @@
-// The OpenGL 4.5 entry points that this folder uses, in one table filled from a context's library: nothing is linked,
-// and one process can use both libraries (OSMesa, EGL).
+// Table of the OpenGL 4.5 functions that this folder uses, loaded from a context's library. Nothing is linked, and one
+// process can use both libraries (OSMesa and EGL).
 #pragma once
 
 #define GL_GLEXT_PROTOTYPES

@@ -10,7 +10,7 @@ namespace pictura::gl {
 
 namespace {
 
-// Memory for the samples of one array, unless a single image needs more.
+// Maximum memory for the samples of one array, unless a single image needs more.
 constexpr int64_t kArrayBytes = int64_t{256} << 20;
 
 GLenum color_format(PixelFormat format) { return format == PixelFormat::u8 ? GL_RGBA8 : GL_RGBA32F; }
@@ -152,7 +152,7 @@ void ImageArray::make_storage() {
 }
 
 void ImageArray::make_resolve_program() {
-  // The driver may use more samples than requested.
+  // Asks for the number of samples, because the driver may use more samples than requested.
   GLint samples = 1;
   if (samples_.multisample > 1) gl_.GetTextureLevelParameteriv(color_, 0, GL_TEXTURE_SAMPLES, &samples);
   resolve_program_ = make_program(
@@ -191,7 +191,7 @@ void ImageArray::plan_copy(int first, int images, void* out, int64_t stride, std
   const std::size_t value_bytes = bytes_per_value(format_);
   const std::size_t row_bytes =
       static_cast<std::size_t>(width_px_) * static_cast<std::size_t>(height_px_) * value_bytes;
-  // A single image may have any stride; CUDA rejects a pitch below a row.
+  // A single image may have any stride, but CUDA rejects a pitch below the size of a row.
   const std::size_t pitch = images > 1 ? static_cast<std::size_t>(stride) * value_bytes : row_bytes;
   for (std::size_t plane = 0; plane < 3; ++plane) {
     copies_out->push_back({(3 * static_cast<std::size_t>(first) + plane) * plane_bytes(), 3 * plane_bytes(),

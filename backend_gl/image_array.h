@@ -1,5 +1,5 @@
-// Images of one size as the layers of one array texture: memory for a whole batch, the samples of every pixel, and the
-// pass that averages them into planar images in a buffer.
+// Images of one size as the layers of one array texture. Contains the memory for a batch of images, with all samples of
+// each pixel, and the pass that averages the samples into planar images in a buffer.
 #pragma once
 
 #include <initializer_list>
@@ -16,30 +16,32 @@ namespace pictura::gl {
 /// Compiles and links a program. Throws Error with the compiler's log.
 GLuint make_program(const Functions& gl, std::initializer_list<std::pair<GLenum, std::string>> shaders);
 
-/// Throws Error naming `where` if OpenGL has reported an error.
+/// Throws Error if OpenGL has reported an error. The message begins with `where`.
 void check_errors(const Functions& gl, const std::string& where);
 
 /// Images as layers of an array texture. The context must be current in all calls, including the destructor.
 class ImageArray {
  public:
-  /// `renderer` prefixes errors. Images are copied to device memory if `interop` is given, else to the host. Throws
-  /// Error if the driver cannot hold one image with this number of samples.
+  /// Messages of errors begin with `renderer`. Images are copied to device memory if `interop` is not null, else to the
+  /// host. Throws Error if the driver cannot store one image with this number of samples.
   ImageArray(const Functions& gl, std::string renderer, const PixelSamples& samples, const CudaInterop* interop,
              int width_px, int height_px);
   ~ImageArray() { release(); }
   ImageArray(const ImageArray&) = delete;
   ImageArray& operator=(const ImageArray&) = delete;
 
-  /// Allocates memory for `images`, limited by the driver and a fixed maximum; returns their number.
+  /// Allocates memory for up to `images` images. The driver and a fixed maximum may limit this number. Returns the
+  /// number of allocated images.
   int reserve(int64_t images, PixelFormat format);
   /// Clears all layers and makes them the render target.
   void begin();
   /// Averages the samples of the first `images` layers into the buffer.
   void resolve(int images);
-  /// Appends to `copies_out` the copies that move consecutive images to `out`, for copy(): three planes per image, with
-  /// `stride` values from one image to the next.
+  /// Appends to copies_out the arguments of copy() for copying consecutive images to `out`. Each image has three
+  /// planes, and there are `stride` values from one image to the next.
   void plan_copy(int first, int images, void* out, int64_t stride, std::vector<RowCopy>* copies_out) const;
-  /// Copies images. To the host, returns when the copies are finished; to a device, enqueues the copies on the stream.
+  /// Copies images. Copies to the host are finished when the call returns; copies to a device are enqueued on the
+  /// stream.
   void copy(Span<const RowCopy> copies, Stream stream);
 
  private:

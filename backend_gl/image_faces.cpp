@@ -8,18 +8,20 @@ namespace pictura::gl {
 
 namespace {
 
-// Maximum depth offsets of strips. Strips of one level are nearly coplanar, and rank decides which is in front. So each
-// strip is depth-tested with an offset away from the camera that grows with its rank. Seen from above, the offset is up
-// to kMaxPush_m: several times the distance between strips of one level, and small compared with the distance between
-// two levels of road. Seen from below, objects on a strip are behind it or in its plane, and must be behind. So there
-// strips move nearer, by one to two times kMaxPushShare of the distance of their planes.
+// Maximum depth offsets of strips. Strips of one level are nearly coplanar, and the strip with the lower rank must be
+// in front. So the depth test uses offset depths, which grow with a strip's rank. If the camera is above a strip, the
+// offset is away from the camera, and its rank-dependent part is at most kMaxPush_m. This is several times the distance
+// between strips of one level, but small compared with the distance between two levels of road. If the camera is below
+// a strip, objects on the strip must be behind the strip, even objects in its plane. So the strip is moved towards the
+// camera, by one to two times kMaxPushShare of the distance of its plane.
 constexpr float kMaxPush_m = 4 * kSameLevel_m, kMaxPushShare = 0.01f;
 
-// Returns the plane whose depth is tested for a strip of rank `order`, 0 to 1, among those of the image. Below the
-// camera, the plane is lowered by the depth to which solids on it may extend through it, so that these are in front.
+// Returns the plane whose depth is tested instead of a strip's depth. `order` is the strip's rank among the strips of
+// the image, scaled to [0, 1]. If the plane is below the camera, it is also lowered by kStanding_m, so that solids that
+// extend through the strip are in front.
 Vec3 compared_plane(const FacePlane& plane, const PinholeCamera& camera, float order) {
   const Vec3 up{camera.right.z, camera.down.z, camera.forward.z};
-  const float above = dot(plane.normal, up);  // also the scale of the offset: above * height of the plane
+  const float above = dot(plane.normal, up);  // raising the plane by h adds h * above to its offset
   const bool camera_above = plane.offset * above <= 0.0f;
   const float offset = camera_above ? plane.offset - (kStanding_m + order * kMaxPush_m) * above
                                     : plane.offset * (1.0f - (2.0f - order) * kMaxPushShare);
@@ -32,7 +34,8 @@ void ImageFaces::build(const ImageSetting& setting, const StaticGeometryView& ge
                        const View& view, int32_t layer) {
   faces_.clear();
   strips_.clear();
-  // A convex polygon as a fan of quadrilaterals; with an odd number of corners, the last is a triangle.
+  // Adds a convex polygon as a fan of quadrilaterals. If the number of corners is odd, the last quadrilateral is a
+  // triangle.
   auto add = [&](const Vec3* corners, int count, Vec3 compared, Rgb color) {
     for (int i = 1; i + 1 < count; i += 2) {
       faces_.push_back(

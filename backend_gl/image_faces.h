@@ -1,5 +1,5 @@
-// Faces of one image, in camera coordinates: all that its camera may show, by the shared rules of shape, colour and
-// width. OpenGL projects, clips and decides visibility.
+// The faces that one image may show, in camera coordinates. Their shapes, colours and widths follow the rules of all
+// renderers (common/raster/). OpenGL projects and clips the faces and decides which are visible.
 #pragma once
 
 #include <utility>
@@ -9,14 +9,16 @@
 
 namespace pictura::gl {
 
-/// Bounds on the ratio of a strip corner's depth to that of its compared plane there. The minimum stands for a
-/// practically infinite distance, beyond the plane's horizon; the maximum is the oracle's limit for near depths.
+/// Bounds on the ratio of the depth of a strip's corner to the depth of FaceInstance::compared_plane at the same screen
+/// point. The minimum represents a practically infinite distance, beyond the plane's horizon. The maximum is the CPU
+/// renderer's limit for small depths.
 constexpr float kMinInverseDepth = 1e-4f, kMaxInverseDepth = kWidenedDepth;
 
 /// One instance of the draw call: a flat quadrilateral, in camera coordinates.
 struct FaceInstance {
-  Vec3 corner[4];  // in order around it
-  // Plane compared_plane . p = 1, whose depth is tested; 0: the face's own depth.
+  Vec3 corner[4];  // in order around the quadrilateral
+  // The depth test uses the depth of the plane compared_plane . p = 1. If compared_plane is 0, it uses the face's own
+  // depth.
   Vec3 compared_plane;
   Rgb color;
   int32_t layer = 0;  // layer of the image array
@@ -24,7 +26,7 @@ struct FaceInstance {
 
 class ImageFaces {
  public:
-  /// Replaces the faces by those of the view. `scene` is in host memory.
+  /// Replaces the faces by those of one camera of the view. `scene` must be in host memory.
   void build(const ImageSetting& setting, const StaticGeometryView& geometry, const SceneBatch& scene, const View& view,
              int32_t layer);
   Span<const FaceInstance> faces() const { return faces_; }

@@ -1,5 +1,6 @@
-// The graphics-pipeline baseline. Faces are built on the host by the shared rules and drawn as instances into array
-// textures, one layer per image. OpenGL projects, clips, and decides visibility by depth.
+// Renderer on the OpenGL graphics pipeline, a baseline for the CUDA renderer. The host builds faces by the rules of all
+// renderers. OpenGL draws them as instances into array textures, one layer per image: it projects, clips, and decides
+// visibility by depth.
 #include <algorithm>
 #include <cstring>
 
@@ -58,7 +59,7 @@ class GlRenderer final : public Renderer {
     drawn_by_ = reinterpret_cast<const char*>(gl_->GetString(GL_RENDERER));
     PICTURA_CHECK(has_extension(*gl_, kLayerExtension), "renderer {}: {} lacks {}", name_, drawn_by_, kLayerExtension);
     make_pipeline();
-    groups_ = make_groups();  // last, so that if it throws, its objects are destroyed while the context is current
+    groups_ = make_groups();  // last: if it throws, its objects are destroyed while the context is still current
   }
   ~GlRenderer() override {
     const gl::CurrentContext current(context_.get());
@@ -135,7 +136,8 @@ class GlRenderer final : public Renderer {
     attribute(4, 3, offsetof(FaceInstance, compared_plane));
     attribute(5, 3, offsetof(FaceInstance, color));
     attribute(6, 0, offsetof(FaceInstance, layer));
-    // Depth is inverse: 1 at the near plane, 0 at infinity, so that single precision suffices at every range.
+    // The depth buffer stores inverse depth, 1 at the near plane and 0 at infinity, so that single precision suffices
+    // at every range.
     gl_->ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     gl_->Enable(GL_DEPTH_TEST);
     gl_->DepthFunc(GL_GREATER);
@@ -178,7 +180,7 @@ class GlRenderer final : public Renderer {
     gl::check_errors(*gl_, fmt::format("renderer {}: drawing", name_));
   }
 
-  // Draws images [begin, end) of a group, which fit its array.
+  // Draws images [begin, end) of a group. They must fit the group's array.
   void draw_images(const SizeGroup& group, int64_t begin, int64_t end, const SceneBatch& scene, Span<const View> views,
                    const ImageBatch& images_out, Stream stream) {
     const auto num_views = static_cast<int64_t>(views.size());
@@ -244,8 +246,8 @@ class GlRenderer final : public Renderer {
     gl_->UnmapNamedBuffer(instances_);
   }
 
-  // Sets the projection from camera coordinates to -1 .. 1 across the image, whose first row is the lowest of the
-  // texture.
+  // Sets the projection from camera coordinates to -1 to 1 across the image. The first row of the image is the lowest
+  // row of the texture.
   void project_by(const PinholeCamera& camera) {
     const float width = static_cast<float>(camera.width_px), height = static_cast<float>(camera.height_px);
     gl_->ProgramUniform4f(program_, projection_, 2.0f * camera.focal_x_px / width, 2.0f * camera.focal_y_px / height,
@@ -256,14 +258,14 @@ class GlRenderer final : public Renderer {
   RendererConfig config_;
   std::vector<PinholeCamera> cameras_;  // in the ego frame
   std::unique_ptr<gl::Context> context_;
-  std::unique_ptr<gl::CudaInterop> interop_;  // set if scenes and images are in device memory
+  std::unique_ptr<gl::CudaInterop> interop_;  // not null if scenes and images are in device memory
   Device memory_;                             // device of scenes and images
   std::string name_, drawn_by_;
   std::unique_ptr<gl::Functions> gl_;
   std::vector<SizeGroup> groups_;
   GLuint program_ = 0, instances_ = 0, vertex_array_ = 0;
   GLint projection_ = -1, positions_ = -1;
-  float positions_per_px_ = 0;  // resolution of the driver's grid of corner positions, along each axis
+  float positions_per_px_ = 0;  // number of corner positions per pixel that the driver distinguishes, along each axis
   HostGeometries geometries_;
   gl::HostScene host_scene_;
   std::vector<gl::ImageFaces> faces_;    // one per layer

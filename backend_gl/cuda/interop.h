@@ -1,5 +1,6 @@
-// Interoperability of this backend and CUDA on one GPU: scenes are read from device memory, and images are copied to
-// device memory without passing through the host. No CUDA type appears here; interop.cpp is built only with CUDA.
+// Interoperability of this backend with CUDA on one GPU: scenes are read from device memory, and images are copied to
+// device memory without a copy on the host. This header uses no CUDA types, because interop.cpp is built only with
+// CUDA.
 #pragma once
 
 #include <memory>
@@ -21,8 +22,8 @@ struct RowCopy {
 class CudaBuffer {
  public:
   virtual ~CudaBuffer() = default;
-  /// Enqueues copies to device memory on the stream, after all earlier and before all later OpenGL commands. The
-  /// buffer's context must be current.
+  /// Enqueues copies to device memory on the stream. They run after all earlier OpenGL commands and before all later
+  /// OpenGL commands. The buffer's context must be current.
   virtual void copy(Span<const RowCopy> copies, Stream stream) = 0;
 };
 
@@ -33,7 +34,7 @@ struct HostScene {
   std::vector<GeometryHandle> geometry;
   std::vector<LightState> light_states;
   std::vector<View> views;
-  std::vector<int32_t> num_views;  // [1], or empty: all
+  std::vector<int32_t> num_views;  // [1], or empty if all views are drawn
   ViewBatch view_batch() const { return {views, num_views.empty() ? nullptr : num_views.data()}; }
   SceneBatch batch() const {
     return {Device{}, world_begin, agents, geometry, light_begin, light_states, hidden_agents};
@@ -43,7 +44,7 @@ struct HostScene {
 class CudaInterop {
  public:
   virtual ~CudaInterop() = default;
-  /// CUDA device of all calls; callers need not make it current.
+  /// CUDA device that all calls use. Callers need not make it current.
   virtual Device device() const = 0;
   /// Waits for the work on a stream.
   virtual void synchronize(Stream stream) const = 0;
@@ -54,8 +55,8 @@ class CudaInterop {
                             HostScene* scene_out) const = 0;
 };
 
-/// Makes the interoperability with a CUDA device. Throws Error if the device cannot be used. Defined only in builds
-/// with CUDA.
+/// Makes the interface to a CUDA device. Throws Error if the device cannot be used. This function is defined only in
+/// builds with CUDA.
 std::unique_ptr<CudaInterop> make_cuda_interop(Device device);
 
 }  // namespace pictura::gl
