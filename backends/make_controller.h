@@ -1,4 +1,4 @@
-// Controllers by name, for simulators on the host and on CUDA devices.
+// Makes controllers by name, for simulators on the host and on CUDA devices.
 #pragma once
 
 #include <memory>
@@ -12,8 +12,8 @@ namespace pictura {
 
 /// Makes a controller: "random" (uniform actions, keyed by seed, world, agent and step), "idle" (no jerk), "lane" (the
 /// lane keeper), and in recorded scenes "log", "inverse" and "idm"; see host_controllers.h. "lane" and "idm" run on the
-/// host for any memory of the simulator, and their name() states this. The controller is for this simulator alone,
-/// which must outlive it. Throws UsageError listing the known names.
+/// host even if the simulator's memory is on a CUDA device, and their name() states this. The controller serves only
+/// this simulator, which must outlive it. Throws UsageError listing the known names.
 std::unique_ptr<Controller> make_controller(const std::string& name, Simulator& simulator, uint64_t seed);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Device-specific parts of a learner besides its policy.
+// The device-specific parts of a learner, except for its policy.
 #pragma once
 
 #include <functional>
@@ -15,9 +15,9 @@ namespace pictura {
 std::unique_ptr<LearnerExecutor> make_learner_executor(Device device);
 std::unique_ptr<SceneHistory> make_scene_history(Device device, const SceneHistorySize& size);
 
-/// Captures as a graph the calls that `work` enqueues on this stream, which must not be the legacy stream. Nothing is
-/// executed before the graph is launched. Throws the exceptions of `work`, and Error for the host and for work that
-/// allocates or waits.
+/// Captures the calls that `work` enqueues on `stream` as a CUDA graph. The stream must not be the legacy default
+/// stream. The calls are executed only when the graph is launched. Throws the exceptions of `work`. Throws Error if the
+/// device is the host, or if `work` allocates memory or waits.
 std::unique_ptr<DeviceGraph> capture_graph(Device device, Stream stream, const std::function<void()>& work);
 
 }  // namespace pictura

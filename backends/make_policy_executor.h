@@ -1,4 +1,4 @@
-// Device-specific parts of a policy besides its network's weights.
+// The device-specific parts of a policy, except for its network's weights.
 #pragma once
 
 #include <memory>
@@ -20,7 +20,8 @@ std::string product_name(Device device);
 /// Makes the executor of a policy. Throws Error if the device is a CUDA device that does not exist.
 std::unique_ptr<PolicyExecutor> make_policy_executor(Device device);
 
-/// Makes the passes of a network. Throws Error for the host, which has none.
+/// Makes the executor of forward and backward passes of a network. Throws Error for the host, which has no such
+/// executor.
 std::unique_ptr<NetworkPasses> make_network_passes(Device device);
 
 }  // namespace pictura

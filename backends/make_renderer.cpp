@@ -11,7 +11,7 @@ namespace pictura {
 // The only public symbol of each backend, declared here so that other files cannot call it.
 std::unique_ptr<Renderer> make_cpu_renderer(const RendererConfig& config);
 #ifdef PICTURA_HAS_CUDA
-/// *origin_out gets the origin of the kernels.
+/// *origin_out receives a text that describes the origin of the kernels.
 std::unique_ptr<Renderer> make_cuda_renderer(const RendererConfig& config, std::string* origin_out);
 std::unique_ptr<Renderer> make_cuda_renderer_for_host(const RendererConfig& config, std::string* origin_out);
 /// Empty if a CUDA device is usable, else the reason why none is.
@@ -25,7 +25,7 @@ std::unique_ptr<Renderer> make_gl_renderer(const std::string& name, const Render
 
 namespace {
 
-// Renderer that draws black, to run everything else without a renderer.
+// Renderer that draws black images, so that everything else can run without a renderer.
 class NullRenderer final : public Renderer {
  public:
   explicit NullRenderer(const RendererConfig& config) : config_(check_config("null", config)) {}

@@ -1,4 +1,4 @@
-// Renderers by name. This file alone knows every renderer backend.
+// Makes renderers by name. Only make_renderer.cpp refers to all renderer backends.
 #pragma once
 
 #include <memory>
@@ -11,10 +11,11 @@
 namespace pictura {
 
 /// Makes a renderer by name: "cpu", "cuda", "gl" ("gl:egl" if EGL gives a context, else "gl:osmesa"), "gl:egl",
-/// "gl:osmesa", "null" (draws black images, to run everything else without a renderer), or "auto". `auto` is `cuda` if
-/// config.device is a CUDA device and such a device is found, else `cpu`. `choice_out`, if given, gets the choice and
-/// its reason and, for `cuda`, the origin of its kernels. If config.device is the host, `cuda` copies scenes to the
-/// device and images back. Throws UsageError listing the known names, and Error when the backend cannot run here.
+/// "gl:osmesa", "null" (draws black images, so that everything else can run without a renderer), or "auto". "auto" is
+/// "cuda" if config.device is a CUDA device and a usable CUDA device is found, else "cpu". If choice_out is not null,
+/// it receives a description of the choice: its reason and, for "cuda", the origin of the kernels. If config.device is
+/// the host, "cuda" copies scenes to the device and images back. Throws UsageError listing the known names if the name
+/// is unknown. Throws Error if the backend cannot run on this machine.
 std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererConfig& config,
                                         std::string* choice_out = nullptr);
 

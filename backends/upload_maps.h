@@ -6,8 +6,8 @@
 
 namespace pictura {
 
-/// Uploads maps to these handles [maps]; without handles, to 0, 1, ..., the handles of a simulator that is made of
-/// these maps.
+/// Uploads each map to its handle. If `handles` is empty, the handles are 0, 1, ..., which a simulator uses for its
+/// maps by default.
 inline void upload_maps(const CompiledMaps& maps, Span<const GeometryHandle> handles, Renderer* renderer_out,
                         Stream stream = {}) {
   for (std::size_t i = 0; i < maps.size(); ++i) {
