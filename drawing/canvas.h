@@ -28,7 +28,7 @@ struct TextStyle {
   Rgb color = hex(0x22262B);
 };
 
-/// An opaque drawing surface, an image or an SVG document; user space is pixels until the matrix is changed.
+/// An opaque drawing surface: an image or an SVG document. Coordinates are pixels unless Cairo's matrix is changed.
 class Canvas {
  public:
   /// Creates an image filled with one colour. Throws Error when the surface cannot be created.
@@ -41,19 +41,20 @@ class Canvas {
   cairo_t* context() const { return context_.get(); }
   cairo_surface_t* surface() const { return surface_.get(); }
 
-  /// Makes ^C end the drawing from now on: set_color(), with which every shape begins, throws Interrupted with this
-  /// message.
+  /// From now on, set_color() throws Interrupted with this message at ^C. Every shape begins with set_color(), so ^C
+  /// ends the drawing.
   void stop_when_interrupted(const std::string& message) { work_.emplace(message); }
 
   void set_color(Rgb color, double alpha = 1);
   void fill_rectangle(double x, double y, double width, double height, Rgb color, double alpha = 1);
   /// Appends a rectangle with round corners to the path.
   void round_rectangle_path(double x, double y, double width, double height, double radius);
-  /// Draws text with its baseline at y, rotated by `angle_rad` counter-clockwise. Returns its advance in pixels.
+  /// Draws text with its baseline at y, rotated counter-clockwise by angle_rad. Returns the advance (the width of the
+  /// text) in pixels.
   double text(double x, double y, const std::string& words, const TextStyle& style, double angle_rad = 0);
   double text_width(const std::string& words, const TextStyle& style) const;
 
-  /// Returns the image. Throws Error with Cairo's reason if any call since the constructor failed.
+  /// Returns the image. If any call since the constructor failed, throws Error with Cairo's reason.
   RgbImage image() const;
   /// Ends the SVG document and returns it. Throws Error as image() does.
   const std::string& svg();
@@ -64,14 +65,15 @@ class Canvas {
     void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
   };
   Canvas(std::unique_ptr<std::string> svg, const std::string& name, int width_px, int height_px, Rgb background);
-  // svg is a reference, because the expression that creates `surface` also reads the pointer, in unspecified order.
+  // `svg` is a reference: the call's argument for `surface` also reads the pointer, and arguments are evaluated in
+  // unspecified order.
   Canvas(cairo_surface_t* surface, std::unique_ptr<std::string>&& svg, const std::string& name, int width_px,
          int height_px, Rgb background);
   void check(cairo_status_t status) const;
   void select_font(const TextStyle& style) const;
 
   std::string name_;                  // name in messages
-  std::unique_ptr<std::string> svg_;  // Cairo's output for the document, at a stable address
+  std::unique_ptr<std::string> svg_;  // Cairo writes the document here, so its address must not change
   std::optional<InterruptibleWork> work_;
   int width_px_, height_px_;
   std::unique_ptr<cairo_surface_t, Free> surface_;

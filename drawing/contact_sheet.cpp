@@ -1,4 +1,4 @@
-// Contact sheets: the camera images of some agents in a grid.
+// Contact sheets: camera images in a grid of views and cameras.
 #include <algorithm>
 #include <vector>
 
@@ -15,7 +15,7 @@ namespace {
 constexpr int kImageGap_px = 6, kCameraNames_px = 30, kViewNames_px = 64;
 constexpr int kPanelWidth_px = 480, kPanelColumns = 3;
 constexpr int kWantedWidth_px = 1600;
-// Limits of a page besides its first camera or first row: Cairo draws at most 32,767 px per side.
+// Limits of a page, which a first camera or a first row may exceed. Cairo draws at most 32,767 px per side.
 constexpr int kMaxPageWidth_px = 16384, kMaxPageHeight_px = 8192;
 constexpr Rgb kSheetColor = hex(0x24272C), kSheetLabelColor = hex(0xD8DCE2);
 const TextStyle kViewStyle{.size_px = 15, .align = Align::right, .color = kSheetLabelColor};
@@ -37,18 +37,18 @@ void paste(Canvas& canvas, const HostImages& images, int view, int camera, int x
   cairo_surface_mark_dirty(canvas.surface());
 }
 
-// Cameras of one view, side by side.
+// Images of cameras [first_camera, end_camera) of one view, side by side.
 struct SheetRow {
   int view, first_camera, end_camera;
 };
 
-// Rows and sizes of all pages; a rig too wide for one row continues in the next row.
+// Rows and sizes of all pages. A rig that is too wide for one row continues in the next row.
 struct SheetLayout {
   int enlargement = 1, left_px = kViewNames_px, row_px = 0, width_px = 0;
   std::vector<SheetRow> rows;
 
-  /// Whether camera names are above a row: at the start of a page, and where the cameras differ from those of the row
-  /// above.
+  /// Whether camera names are drawn above a row: on the first row of a page, and on a row whose cameras differ from
+  /// those of the row above.
   bool has_names(const SheetRow* row, const SheetRow* first) const {
     return row == first || row->first_camera != row[-1].first_camera;
   }

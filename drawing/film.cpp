@@ -57,7 +57,7 @@ RendererConfig film_view(const RendererConfig& trained_view) {
     camera.center_y_px *= scale_y;
     line_scale = std::min(line_scale, scale);
   }
-  // One width for all cameras: that of the widest.
+  // All cameras have the line width that suits the widest camera.
   view.line_floor_px = std::min(view.line_floor_px * line_scale, kMaxLineFloor_px);
   return view;
 }

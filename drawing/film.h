@@ -1,4 +1,4 @@
-// Film of one world: from above, with one agent's cameras below.
+// Film of one simulated world: a view from above, and below it the camera images of one agent.
 #pragma once
 
 #include <memory>
@@ -14,21 +14,22 @@ namespace pictura {
 struct FilmOptions {
   int agent = 0;        // agent that the film follows
   float width_m = 150;  // width of the view from above around the agent; 0: the whole map
-  /// Settings of a trained policy's images; by default, the paper's cameras are shown.
+  /// Settings of the images that a trained policy observes. By default, the film shows the four cameras of paper_rig().
   std::optional<RendererConfig> trained_view;
   int num_threads = 0;  // 0: all
 };
 
-/// Settings for the pictures of a policy's cameras in a film. Each picture is as wide as the film's columns. The
-/// minimum width of lines is scaled so that a line takes the same share of the picture as of the policy's image.
+/// Settings for a film's pictures from a policy's cameras. Each picture is as wide as the film's columns. The minimum
+/// width of lines is scaled with the image, so that a line covers the same share of the picture as of the policy's
+/// image.
 RendererConfig film_view(const RendererConfig& trained_view);
 
-/// Order of a rig's cameras in a film: from left to right, then cameras that face backwards.
+/// Order of a rig's cameras in a film: cameras from left to right, then cameras that face backwards.
 std::vector<int> film_order(const Rig& rig);
 
 class Film {
  public:
-  /// Opens the file; its ending selects the format, .mp4 or .gif. Throws Error naming the path.
+  /// Opens the file. The file name's ending selects the format, .mp4 or .gif. Throws Error naming the path.
   Film(const std::string& path, const Simulator& simulator, const FilmOptions& options);
   ~Film();
   /// Adds the simulator's current state.

@@ -10,13 +10,13 @@ namespace pictura {
 
 namespace {
 
-/// Point half a width to the left (side 1) or to the right (-1).
+/// Point of a lane's left border (side 1) or right border (side -1).
 Vec2 border(const LanePoint& point, double side) {
   const Eigen::Isometry2d pose = pose_in_plan(in_plan(point.position_m), point.heading_rad);
   return rounded(pose * Eigen::Vector2d{0, side * 0.5 * point.width_m});
 }
 
-/// Drawing layer of a lane type; later layers cover earlier ones.
+/// Drawing layer of a lane type. Higher layers cover lower layers.
 int layer_of(LaneType type) {
   switch (type) {
     case LaneType::sidewalk: return 0;

@@ -1,4 +1,4 @@
-// Shapes of lanes from above, without a canvas: their outlines, and the order in which they cover each other.
+// Shapes of lanes from above: their outlines, and the order in which they cover each other. Needs no canvas.
 #pragma once
 
 #include <vector>

@@ -16,7 +16,7 @@ namespace {
 // Minimum scales of arrows, names and lane numbers, in pixels per metre.
 constexpr double kArrowScale = 1.5, kNameScale = 5, kNumberScale = 9;
 
-/// Pose on a lane's centre line s metres from its start.
+/// Pose on a lane's centre line, s_m metres from the lane's start.
 Isometry2d pose_at(Span<const LanePoint> points, double s_m) {
   size_t i = 1;
   while (i + 1 < points.size() && points[i].s_m < s_m) ++i;
@@ -44,7 +44,7 @@ void paint_arrows(GroundPen& pen, const RoadMap& map, const Lane& lane) {
 
 void paint_lane_number(GroundPen& pen, const RoadMap& map, size_t index) {
   const Lane& lane = map.lanes[index];
-  // Before the arrow in the middle, if there is one.
+  // In front of the arrow at the lane's middle, if an arrow is there.
   const Vector2d position = pose_at(map.points_of(lane), 0.5 * lane.length_m) * Vector2d{-14 / pen.px_per_m(), 0};
   if (!pen.is_visible(position, 1)) return;
   const bool on_dark = is_drivable(lane.type);
@@ -52,7 +52,7 @@ void paint_lane_number(GroundPen& pen, const RoadMap& map, size_t index) {
             {.size_px = 9, .align = Align::center, .color = on_dark ? hex(0xE6E9ED) : hex(0x5A6068)});
 }
 
-/// Paints the line, shaded on the side of its buildings.
+/// Paints the line, with shading on the side of its buildings.
 void paint_building_line(GroundPen& pen, const BuildingLine& line) {
   const Vector2d a = in_plan(line.a_m), b = in_plan(line.b_m), along = b - a;
   if (along.isZero(0) || !pen.is_visible(0.5 * (a + b), along.norm())) return;
@@ -62,7 +62,7 @@ void paint_building_line(GroundPen& pen, const BuildingLine& line) {
   pen.line(a, b, pen.at_least(0.2, 1), kBuildingLineInk);
 }
 
-/// Paints the angle within which the head is visible, and a line to its stop line.
+/// Paints the angle within which the light's head is visible, and a line from the head to its stop line.
 void paint_light_angle(GroundPen& pen, const TrafficLight& light) {
   const float half_angle = MapGeometryOptions{}.light_half_angle_rad;
   const double radius_m = pen.at_least(6, 14);
@@ -99,7 +99,7 @@ void paint_sign(GroundPen& pen, const Sign& sign) {
   cairo_stroke(pen.context());
 }
 
-/// Paints a name behind the light or sign, where no other part of it is drawn.
+/// Paints a name behind the light or sign, where no part of the light or sign is drawn.
 void paint_name(GroundPen& pen, const Vector2d& position, const Vector2d& facing, const std::string& name, Rgb color) {
   if (!pen.is_visible(position, 1)) return;
   const Vector2d behind = position - 11 / pen.px_per_m() * facing;

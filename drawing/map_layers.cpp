@@ -91,7 +91,7 @@ Rgb phase_color(int phase) {
 
 GroundPen::GroundPen(Canvas& canvas, const Vector2d& left_top_m, double px_per_m)
     : canvas_(canvas), to_pixels_(to_pixels(left_top_m, px_per_m)), px_per_m_(px_per_m) {
-  constexpr float kMargin_m = 1;  // lines are wider than their boxes
+  constexpr float kMargin_m = 1;  // painted lines extend beyond their bounding boxes
   visible_ = empty_box();
   for (const Vector2d& corner_px : {Vector2d{0, 0}, Vector2d(canvas.width_px(), canvas.height_px())}) {
     grow(&visible_, rounded(to_pixels_.inverse() * corner_px), kMargin_m);
@@ -171,7 +171,7 @@ void MapLayers::paint_lanes(GroundPen& pen) const {
     cairo_close_path(context);
     pen.canvas().set_color(lane_color(lane.type));
     cairo_fill_preserve(context);
-    // Slightly wider than the lane, so that neighbours leave no seam.
+    // The outline is stroked, which makes the lane slightly wider, so that there is no seam between neighbouring lanes.
     cairo_set_line_width(context, pen.at_least(0.1, 0.7));
     cairo_stroke(context);
   }
@@ -192,8 +192,8 @@ void MapLayers::paint_parking_spaces(GroundPen& pen) const {
   }
 }
 
-/// Paints bars across the direction of the longest side, along the whole outline, whose sides recordings may divide,
-/// and clipped to the outline.
+/// Paints bars across the direction of the longest side, along the whole outline, and clips them to the outline. The
+/// whole outline is used, because recordings may divide a side into several sides.
 void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) const {
   cairo_t* context = pen.context();
   const int32_t count = crosswalk.outline.size();
@@ -210,7 +210,8 @@ void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) cons
       along = side / longest;
     }
   }
-  double reach = 0, low = 0, high = 0;  // maximum distance of corners from the centre; range along the bars
+  double reach = 0, low = 0,
+         high = 0;  // maximum distance of corners from the centre; range along `along`
   for (int32_t i = 0; i < count; ++i) {
     const Vector2d from_center = corner(i) - center;
     reach = std::max(reach, from_center.norm());

@@ -1,5 +1,5 @@
-// Static parts of a map from above on a canvas, for pictures of maps and for films of worlds. Private to the drawing
-// library.
+// Painting of the static parts of a map from above, for pictures of maps and for films of worlds. Private to the
+// drawing library.
 #pragma once
 
 #include <vector>
@@ -16,8 +16,8 @@ constexpr Rgb kRoadEdgeInk = hex(0xC8312F);
 constexpr Rgb kStopLineInk = hex(0xFFFFFF);
 constexpr Rgb kParkingSpaceInk = hex(0xC9D2DE);
 
-/// Bounding box of a map's lanes, edges, markings and parking spaces, which contain nearly everything else. Throws
-/// Error when the map has none of these.
+/// Bounding box of a map's lanes, road edges, markings and parking spaces. Nearly all other parts of a map are inside
+/// it. Throws Error when the map has none of these.
 Aabb2 bounds_of(const RoadMap& map);
 
 /// Colour of a lane's surface from above.
@@ -26,11 +26,12 @@ Rgb lane_color(LaneType type);
 /// Colour of a painted line from above.
 Rgb paint_color(MarkColor color);
 
-/// Colour of a junction's phase, for stop lines and heads without a known state.
+/// Colour of a phase (the stop lines of a junction that are green together), for stop lines and heads without a known
+/// state.
 Rgb phase_color(int phase);
 
-/// Drawing in a map's metres on a canvas: its top left pixel is at left_top_m, north is up. The destructor restores the
-/// canvas's units.
+/// Drawing on a canvas in the metres of a map. The canvas's top left pixel is at left_top_m, and north is up. The
+/// destructor restores the canvas's units.
 class GroundPen {
  public:
   GroundPen(Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m);
@@ -51,7 +52,7 @@ class GroundPen {
   void line_to(const Eigen::Vector2d& p) { cairo_line_to(context(), p.x(), p.y()); }
   void line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double width_m, Rgb color, double alpha = 1);
   void disk(const Eigen::Vector2d& center, double radius_m, Rgb color, double alpha = 1);
-  /// Draws text at a position, sized in pixels at any scale.
+  /// Draws text at a position. Its size is in pixels, independent of the scale.
   void label(const Eigen::Vector2d& position, const std::string& words, const TextStyle& style);
 
  private:
@@ -66,7 +67,7 @@ class MapLayers {
  public:
   explicit MapLayers(const RoadMap& map);
 
-  /// Paints all layers with left_top_m at the top left pixel of the canvas; parts outside the canvas are skipped.
+  /// Paints all layers, with left_top_m at the top left pixel of the canvas. Parts outside the canvas are skipped.
   void paint(Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m) const;
 
  private:

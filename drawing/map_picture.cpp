@@ -21,7 +21,7 @@ namespace {
 constexpr Rgb kPanelColor = hex(0xFFFFFF), kPanelLine = hex(0xC9CCC4);
 constexpr Rgb kQuietText = hex(0x5A6068), kInk = hex(0x22262B);
 
-/// Sizes that scale with the picture.
+/// Sizes in pixels that scale with the picture.
 struct Metrics {
   double unit;  // 1 for a picture of 1600 px
   double px(double at_1600) const { return std::max(1.0, at_1600 * unit); }
@@ -82,7 +82,7 @@ std::vector<LegendEntry> legend_of(const RoadMap& map, const Scenario* scenario)
   return entries;
 }
 
-/// The legend in rows that fit a width.
+/// The legend, divided into rows that fit a width.
 class Legend {
  public:
   Legend(const RoadMap& map, const Scenario* scenario, const Metrics& m, double width_px) : m_(m) {
@@ -121,7 +121,7 @@ class Legend {
   void draw_sample(Canvas& canvas, const LegendEntry& entry, double x, double middle, double width) const {
     const double top = middle - m_.px(6), height = m_.px(12);
     cairo_t* context = canvas.context();
-    // Paint is drawn on the colour of a road.
+    // Entries for paint have the colour of a road as background.
     if (entry.shape == LegendEntry::line || entry.shape == LegendEntry::bars || entry.shape == LegendEntry::frame) {
       canvas.fill_rectangle(x, top, width, height, lane_color(LaneType::driving));
     }
@@ -196,8 +196,9 @@ Layout layout_of(const RoadMap& map, const MapPictureOptions& options) {
   const double margin = m.px(28), strip = m.px(36);  // the strip below contains the scale bar
   const double width_m = std::max(1.0f, shown.high.x - shown.low.x),
                height_m = std::max(1.0f, shown.high.y - shown.low.y);
-  // The longer side of the whole picture, including the band, is size_px; a narrow map is still wide enough for its
-  // title. The band's height and the width depend on each other: a wider picture needs at most as many rows.
+  // The longer side of the whole picture, including the band, is size_px. The picture of a narrow map is still wide
+  // enough for its title. The band's height and the picture's width depend on each other: a wider picture needs no more
+  // rows.
   const auto width_at = [&](double px_per_m) {
     return std::clamp(static_cast<int>(std::ceil(width_m * px_per_m + 2 * margin)), size_px * 3 / 5, size_px);
   };
@@ -223,7 +224,7 @@ Layout layout_of(const RoadMap& map, const MapPictureOptions& options) {
 
 void draw_scale_bar(Canvas& canvas, const Layout& layout) {
   const Metrics& m = layout.m;
-  // Longest round length of at most a fifth of the width.
+  // Length of the scale bar: the longest round length of at most a fifth of the width.
   const double max_m = 0.2 * canvas.width_px() / layout.px_per_m;
   const double power = std::pow(10.0, std::floor(std::log10(max_m)));
   const double length_m = max_m >= 5 * power ? 5 * power : (max_m >= 2 * power ? 2 * power : power);
@@ -249,12 +250,12 @@ std::vector<Coordinate> round_coordinates(double low_m, double high_m) {
   return coordinates;
 }
 
-/// Draws the file's coordinates along the upper and the left side, for --box and --at.
+/// Draws coordinates of the map's file along the upper and the left side, for the options --box and --at.
 void draw_coordinates(Canvas& canvas, const Layout& layout, const RoadMap& map) {
   const Metrics& m = layout.m;
   const double left_m = layout.left_top_m.x() + map.origin_m[0], top_m = layout.left_top_m.y() + map.origin_m[1];
   const TextStyle style{.size_px = m.px(11), .align = Align::center, .color = kQuietText};
-  const double corner_px = m.px(40);  // where labels of both sides would meet
+  const double corner_px = m.px(40);  // size of the corner where labels of both sides would overlap
   const double right_m = left_m + canvas.width_px() / layout.px_per_m;
   for (const auto& [x_m, text] : round_coordinates(left_m, right_m)) {
     const double x = (x_m - left_m) * layout.px_per_m;

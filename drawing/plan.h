@@ -1,5 +1,5 @@
-// Plan views in double precision: points, poses, and the transform from a map to its picture. Private to the drawing
-// library.
+// Points and poses on the ground plane in double precision, and the transform from a map to its picture. Private to the
+// drawing library.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -8,14 +8,15 @@
 
 namespace pictura {
 
-/// Converts a point of a map to a point in plan.
+/// Converts a point of a map to a point on the ground plane.
 inline Eigen::Vector2d in_plan(Vec2 p) { return {p.x, p.y}; }
 inline Eigen::Vector2d in_plan(Vec3 p) { return in_plan(p.xy()); }
 
-/// Rounds a point in plan to the precision of maps.
+/// Rounds a point on the ground plane to the precision of maps.
 inline Vec2 rounded(const Eigen::Vector2d& p) { return {static_cast<float>(p.x()), static_cast<float>(p.y())}; }
 
-/// Transform from a local frame (x ahead of a place, y to its left, in metres) to the map.
+/// Transform from a local frame to the map. The frame's origin is position_m, x is ahead and y is to the left, in
+/// metres.
 inline Eigen::Isometry2d pose_in_plan(const Eigen::Vector2d& position_m, double heading_rad) {
   return Eigen::Translation2d(position_m) * Eigen::Rotation2Dd(heading_rad);
 }

@@ -10,7 +10,7 @@ namespace pictura {
 
 namespace {
 
-// Colours by class of docs/explanation/image.md, from 0 (nothing).
+// Colours of the classes, from class 0 (nothing), as in docs/explanation/image.md.
 constexpr Rgb kClassColors[] = {{},
                                 agent_color(AgentClass::vehicle, BoxFace::right),
                                 agent_color(AgentClass::cyclist, BoxFace::front),
@@ -22,7 +22,7 @@ constexpr Rgb kClassColors[] = {{},
                                 kCrosswalkColor,
                                 kStopLineColor};
 
-// Gives consecutive numbers distant hues: steps of the golden ratio around the circle.
+// Gives consecutive numbers distant hues, by steps of the golden ratio around the circle of hues.
 Rgb hue_of(int instance) {
   const float hue = 6 * std::fmod(0.61803399f * static_cast<float>(instance), 1.0f);
   auto channel = [&](float shift) {
@@ -32,7 +32,7 @@ Rgb hue_of(int instance) {
   return {channel(0), channel(4), channel(2)};
 }
 
-// Grey that darkens with range, but never black, which means no surface.
+// Grey that darkens with depth. It is never black, because black means no surface.
 Rgb grey_of(float depth_m) {
   const float value = clamp(1.0f - depth_m / kVisibleRange_m, 1.0f / 255, 1.0f);
   return {value, value, value};

@@ -1,4 +1,4 @@
-// Depth, class and instance planes as pictures.
+// Pictures of an image's optional planes: depth, class and instance.
 #pragma once
 
 #include <string>
@@ -13,8 +13,8 @@ enum class Plane { depth, class_id, instance_id };
 Plane plane_by_name(const std::string& name);
 
 /// Draws a plane of one image, black at pixels without a surface. Depth: grey 255 x (1 - depth / 120 m), at least 1.
-/// Class: the colour of the object's kind in docs/explanation/image.md (for vehicles, of the right side). Instance: a
-/// hue per agent, black elsewhere.
+/// Class: the colour of the object's kind in docs/explanation/image.md; vehicles have the colour of their right side.
+/// Instance: a different hue for each agent, and black elsewhere.
 RgbImage plane_picture(const HostImages& images, int view, int camera, Plane plane);
 
 }  // namespace pictura

@@ -13,7 +13,7 @@ std::vector<double> round_ticks(double low, double high, int wanted) {
   const double ratio = raw / power;
   const double step = power * (ratio < 1.5 ? 1 : (ratio < 3.5 ? 2 : (ratio < 7.5 ? 5 : 10)));
   const double first = std::ceil(low / step - 1e-9), last = std::floor(high / step + 1e-9);
-  // Counted by an integer, since adding one to a number as large as `first` may have no effect.
+  // The loop counts with an integer, because adding 1 to a double as large as `first` may have no effect.
   const auto count = static_cast<int>(std::min(last - first + 1, 4.0 * wanted));
   for (int i = 0; i < count; ++i) ticks.push_back((first + i) * step);
   return ticks;

@@ -1,14 +1,13 @@
-// Round positions along an axis.
+// Positions of ticks along an axis, at round numbers.
 #pragma once
 
 #include <vector>
 
 namespace pictura {
 
-/// Returns round positions for axis ticks: a step of 1, 2 or 5 times a power of ten, with about `wanted` ticks within
-/// [low, high].
+/// Returns about `wanted` positions of axis ticks within [low, high]. Their distance is 1, 2 or 5 times a power of ten.
 std::vector<double> round_ticks(double low, double high, int wanted);
-/// Returns the number of decimals, at most six, that distinguishes ticks at a distance of `step`.
+/// Returns the number of decimals, at most six, with which labels distinguish ticks at a distance of `step`.
 int tick_decimals(double step);
 
 }  // namespace pictura

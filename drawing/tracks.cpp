@@ -24,7 +24,7 @@ void paint_box(GroundPen& pen, const RecordedTrack& track, const TrackState& sta
   pen.canvas().set_color(hex(0x22262B));
   cairo_set_line_width(pen.context(), pen.at_least(0.05, kMinOutline_px));
   cairo_stroke(pen.context());
-  // White line that marks the front.
+  // A white line marks the front.
   pen.line(at(0.5 * front, 0), at(front, 0), pen.at_least(0.1, kMinOutline_px), hex(0xFFFFFF));
 }
 

@@ -1,4 +1,4 @@
-// Recorded road users from above: their paths, and their boxes at one step. Private to the drawing library.
+// Painting of recorded road users from above: their paths, and their boxes at one step. Private to the drawing library.
 #pragma once
 
 #include "pictura/drawing/map_layers.h"
@@ -14,7 +14,7 @@ Rgb track_color(TrackType type);
 /// Paints every track as a line through its valid states, interrupted at gaps, and the stop lines of recorded lights.
 void paint_paths(const Scenario& scenario, Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m);
 
-/// Paints the boxes of all tracks that are valid at a step of the scenario.
+/// Paints the boxes of all tracks whose state is valid at a step of the scenario.
 void paint_boxes(const Scenario& scenario, int32_t step, Canvas& canvas, const Eigen::Vector2d& left_top_m,
                  double px_per_m);
 

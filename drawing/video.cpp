@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Descriptor at which ffmpeg finds its output file.
+// Descriptor of the output file in the ffmpeg process.
 constexpr int kFilmInChild = 3;
 
 std::string last_line(std::FILE* file) {
@@ -97,7 +97,8 @@ void VideoWriter::Impl::start(std::vector<std::string> arguments) {
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, ::fileno(messages.get()), STDERR_FILENO);
   posix_spawn_file_actions_adddup2(&actions, film->fd(), kFilmInChild);
-  // In its own process group, so that ^C in a terminal does not end ffmpeg before this process has finished the video.
+  // ffmpeg runs in its own process group, so that ^C in a terminal does not end ffmpeg before this process has finished
+  // the video.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
@@ -155,7 +156,8 @@ VideoWriter::VideoWriter(const std::string& path, int width_px, int height_px, d
                              "-filter_complex",
                              "split[a][b];[a]palettegen[p];[b][p]paletteuse=dither=bayer:bayer_scale=4", "-f", "gif"};
   arguments.insert(arguments.end(), format.begin(), format.end());
-  // A path by descriptor: the file may have no name yet, and ffmpeg can read it again to move its index to the front.
+  // The output is a path to the descriptor: the file may have no name yet, and ffmpeg must be able to read the file
+  // again to move its index to the front.
   arguments.push_back(fmt::format("file:/proc/self/fd/{}", kFilmInChild));
   impl_->start(std::move(arguments));
 }

@@ -1,4 +1,4 @@
-// Video: frames of raw pixels piped into the ffmpeg program.
+// Writer of videos, which sends frames of raw pixels to the ffmpeg program.
 #pragma once
 
 #include <memory>
@@ -8,20 +8,21 @@
 
 namespace pictura {
 
-/// Writer of a video, frame by frame; the file appears under its name when finish() returns. The extension selects the
-/// format: .mp4 (H.264, yuv420p; an odd side loses its last row or column) or .gif (one palette per video).
-/// Single-threaded; an unfinished video leaves no file.
+/// Writer of one video, frame by frame. The file has its name only after finish() has returned; an unfinished video
+/// leaves no file. The extension selects the format: .mp4 (H.264, yuv420p) or .gif (one palette per video). If a side
+/// of an .mp4 is odd, its last row or column is dropped. An object must be used by one thread only.
 class VideoWriter {
  public:
-  /// Throws UsageError for another extension, and Error when the folder is not writable or ffmpeg cannot be started.
+  /// Throws UsageError for any other extension. Throws Error if the folder is not writable or ffmpeg cannot be started.
   VideoWriter(const std::string& path, int width_px, int height_px, double frames_per_s);
   ~VideoWriter();
   VideoWriter(const VideoWriter&) = delete;
   VideoWriter& operator=(const VideoWriter&) = delete;
 
-  /// Adds a frame. Throws Error when the frame has another size, or with ffmpeg's last line if ffmpeg has ended.
+  /// Adds a frame. Throws Error if the frame has another size. If ffmpeg has ended, throws Error with ffmpeg's last
+  /// line of output.
   void add(const RgbImage& frame);
-  /// Completes the video and moves it to its name. Throws Error when ffmpeg failed or there is no frame.
+  /// Completes the video and gives the file its name. Throws Error if ffmpeg failed or no frame was added.
   void finish();
 
  private:

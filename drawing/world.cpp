@@ -19,10 +19,10 @@ using Eigen::Vector2d;
 namespace {
 
 constexpr int kTile_px = 512;
-constexpr size_t kMaxTiles = 160;  // 160 MiB, besides the tiles of one picture
+constexpr size_t kMaxTiles = 160;  // 160 MiB; the tiles of one picture may need more
 constexpr Rgb kHaloColor = hex(0xFFE45C);
 
-/// Whole pixels from the map's origin to the top left corner of the picture.
+/// Position of the picture's top left corner relative to the map's origin, in whole pixels.
 struct Corner {
   int x = 0, y = 0;
 };
@@ -40,7 +40,8 @@ Rgb mixed(Rgb a, Rgb b, float share_of_b) {
   return {a.r + (b.r - a.r) * share_of_b, a.g + (b.g - a.g) * share_of_b, a.b + (b.b - a.b) * share_of_b};
 }
 
-/// Colours of the back (body) and the front (mark) in camera images; parked and halted agents fade to grey.
+/// Colours of an agent, those of its back (body) and its front (mark) in camera images. Parked and halted agents are
+/// greyer.
 struct AgentColors {
   Rgb body, mark;
 };
@@ -55,12 +56,12 @@ AgentColors colors_of(AgentClass agent_class, AgentStatus status) {
 void paint_agent(Canvas& canvas, const AgentBox& agent, AgentStatus status, const Vector2d& center_px,
                  double px_per_m) {
   cairo_t* context = canvas.context();
-  // Large enough to be visible where a pixel is a metre or more.
+  // Large enough to be visible even if a pixel is a metre wide or more.
   const double length = std::max(agent.length_m * px_per_m, 7.0), width = std::max(agent.width_m * px_per_m, 4.0);
   const AgentColors colors = colors_of(agent.agent_class, status);
   cairo_save(context);
   cairo_translate(context, center_px.x(), center_px.y());
-  // The y axis of pixels points down, so a counter-clockwise heading is clockwise here.
+  // The y axis of pixels points down, so a counter-clockwise heading is a clockwise rotation here.
   cairo_rotate(context, -std::atan2(agent.sin_heading, agent.cos_heading));
   cairo_rectangle(context, -0.5 * length, -0.5 * width, length, width);
   canvas.set_color(colors.body);
@@ -81,7 +82,7 @@ void paint_wall(GroundPen& pen, const WallFace& wall) {
   pen.line(in_plan(wall.a_m), in_plan(wall.b_m), pen.at_least(0.5, 1.5), hex(0x7A6552));
 }
 
-/// Reasons to halt, in the order of the legend; a ring has the colour of the first that applies.
+/// Reasons to halt, in the order of the legend. An agent's ring has the colour of the first reason that applies.
 struct HaltReason {
   int events;
   const char* name;
@@ -178,7 +179,7 @@ Rgb lamp_color(LightState state) {
   return state == LightState::off || state == LightState::unknown ? hex(0x4A4F57) : light_color(state);
 }
 
-// Paints the agent at the centre of its circle, and its way along its waypoints, of which the next is the largest.
+// Paints a halo around the agent and a line along its waypoints. The next waypoint is the largest.
 void paint_highlight(Canvas& canvas, const Vector2d& position, double length_px,
                      const std::vector<Vector2d>& waypoints) {
   cairo_t* const context = canvas.context();
