@@ -23,7 +23,7 @@ DrivenWorlds drive_worlds(const DrivenOptions& options) {
   std::vector<std::shared_ptr<const RoadMap>> maps;
   for (const std::string& name : options.maps) maps.push_back(load_map(name));
   const int num_maps = static_cast<int>(maps.size());
-  // An eighth more than the views need, since not every agent finds a place.
+  // An eighth more agents than views, because not every agent can be spawned.
   const int wanted = options.num_views + options.num_views / 8;
   const int num_worlds = options.num_views > 0 ? (wanted + options.agents - 1) / options.agents : num_maps;
   std::vector<WorldSpec> specs;

@@ -23,10 +23,10 @@ namespace pictura {
 
 namespace {
 
-// Number of random choices that calls use in turn, so that no call finds its data in caches.
+// Number of sets of random choices. Calls use the sets cyclically, so that no call finds its data in caches.
 constexpr std::size_t kChoices = 8;
 
-// Elements in the memory of a device.
+// An array in the memory of a device or of the host.
 template <typename T>
 class Elements {
  public:
@@ -73,7 +73,7 @@ class Elements {
 #endif
 };
 
-// Copies elements to the host after the device's work.
+// Copies elements to the host after the device has finished its work.
 template <typename T>
 std::vector<T> to_host(Span<const T> from, Device device) {
   std::vector<T> result(from.size());
@@ -87,7 +87,7 @@ std::vector<T> to_host(Span<const T> from, Device device) {
   return result;
 }
 
-// Images of a number of views, u8.
+// Images of a number of views, in u8.
 class Images {
  public:
   Images(const Rig& rig, int num_views, Device device)
@@ -121,7 +121,7 @@ class Images {
   ImageBatch batch_;
 };
 
-// An image drawn at its step.
+// The images of a view, drawn during the view's step.
 struct CheckedView {
   int64_t row = 0;
   std::vector<uint8_t> pixels;
@@ -153,7 +153,7 @@ class HistoryBench {
  private:
   std::size_t num_slots() const { return static_cast<std::size_t>(simulator_->num_slots()); }
 
-  // Fills the history, and keeps images of some steps.
+  // Fills the history, and keeps the images of some views.
   void record() {
     StepBench steps(simulator_.get(), case_.simulator.seed);
     if (case_.warm_up_steps > 0) steps.run(case_.warm_up_steps);
@@ -188,7 +188,7 @@ class HistoryBench {
     }
   }
 
-  // Draws one of the rows [first, all) of present agents.
+  // Returns a random row of a present agent, from present_rows_[first] on.
   int64_t draw(std::size_t first) { return present_rows_[first + random_() % (present_rows_.size() - first)]; }
 
   void choose() {
@@ -204,7 +204,7 @@ class HistoryBench {
     }
   }
 
-  // Draws the kept views from the history, in reverse order.
+  // Draws the kept views from the history, in reverse order, and compares the images with the kept images.
   void compare() {
     if (seen_.empty()) return;
     std::vector<int64_t> rows;
@@ -233,8 +233,8 @@ class HistoryBench {
     renderer_->render(history_->scene(), Span<const View>(views.data(), views.size()), images);
   }
 
-  // Returns mean milliseconds of calls, which use the random choices in turn. Waits, so that the host's clock can be
-  // used.
+  // Returns the mean time of `calls` calls in milliseconds. The calls use the sets of random choices cyclically. Waits
+  // for the device before it reads the host's clock.
   template <typename Call>
   double time_of(int calls, const Call& call) {
     renderer_->check();

@@ -1,4 +1,5 @@
-// Differences of images from the oracle's images, value by value, and the tolerance for kernels.
+// Differences between the values of images and of the oracle's images (the CPU renderer's), and the tolerance for the
+// CUDA renderer.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +13,8 @@ struct ImageError {
   int64_t values = 0, differing = 0;
   int64_t beyond = 0;  // errors above kKernelError
   double worst = 0;
-  // Pixels with planes, and pixels whose planes have another surface.
+  // Number of pixels with planes (depth, class, instance), and number of those pixels at which the planes show
+  // different surfaces.
   int64_t plane_pixels = 0, differing_plane_pixels = 0;
 
   void add(const ImageError& other);
@@ -20,16 +22,16 @@ struct ImageError {
   bool is_within_tolerance() const;
 };
 
-/// Compares one view's image of one camera, and its planes if present; both images must have the same format, size and
-/// order.
+/// Compares one view's image of one camera, and the image's planes if present. Both images must have the same format,
+/// size and order.
 ImageError compare_image(const CameraImages& actual, const CameraImages& expected, PixelFormat format, int view,
                          ChannelOrder order = ChannelOrder::planar, int patch_px = kDefaultPatch_px);
 
-/// Byte that fills images before drawing, so that unwritten values are found: far from any colour as a float or a half,
-/// and not a valid depth, class or instance.
+/// Byte that fills images before drawing, so that unwritten values are found. Floats and halves of this byte are far
+/// from any colour, and it is no valid depth, class or instance.
 constexpr int kUnwrittenByte = 0x7F;
 
-/// Calls visit(first byte, bytes between rows, bytes of a row, rows) for all memory of colours and planes.
+/// Calls visit(first byte, bytes from row to row, bytes of a row, number of rows) for all memory of colours and planes.
 template <typename Visit>
 void visit_memory(const ImageBatch& images, Visit&& visit) {
   const auto views = static_cast<std::size_t>(images.num_views);

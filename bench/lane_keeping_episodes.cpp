@@ -14,7 +14,7 @@ std::vector<DrivenEpisode> drive_lane_keeping_episodes(const std::shared_ptr<con
   config.fixed_lights = true;
   config.vector_observations = false;
   config.episode_steps = steps + 1;
-  config.reset_inactive_fraction = 2;  // a world whose agent has halted continues
+  config.reset_inactive_fraction = 2;  // so that a world continues when its agents have halted
   config.conditioning[static_cast<size_t>(Conditioning::delta_goal_m)] = {2, 2, false};
   for (size_t c = kNumRewardConditioning; c < kNumConditioning; ++c) config.conditioning[c] = {1, 1, false};
   std::vector<WorldSpec> specs;

@@ -1,4 +1,4 @@
-// Whole episodes driven by the lane-keeping controller, which demonstrate that a map is drivable.
+// Whole episodes that the lane-keeping controller drives. They show whether agents can drive on a map.
 #pragma once
 
 #include <memory>
@@ -10,16 +10,17 @@ namespace pictura {
 
 /// Outcome of a lane-keeping agent's episode.
 struct DrivenEpisode {
-  int goals = 0;  // last waypoints passed within 2 m
+  int goals = 0;  // goals (last waypoints of three) passed within 2 m
   int halt_reason = kEventNone;
   int stops = 0, steps_off_path = 0;
   float distance_m = 0;
   Vec2 end_m;
 };
 
-/// Drives for `steps` steps, or until an infraction, in num_worlds worlds on the map with drivers_each agents among
-/// parked cars, from the first episode of config.seed on. The share of cyclists is config.cyclist_fraction. Everything
-/// else is as in evaluation: waypoints of 2 m, lights with fixed timing, no multipliers.
+/// Drives for `steps` steps in num_worlds worlds on the map, each with drivers_each agents among parked cars. An agent
+/// stops at its first infraction. The worlds begin with the first episode of config.seed, and config.cyclist_fraction
+/// of the agents are cyclists. Everything else is as in evaluations: waypoints of 2 m, lights with fixed timing, no
+/// multipliers of rewards.
 std::vector<DrivenEpisode> drive_lane_keeping_episodes(const std::shared_ptr<const RoadMap>& map,
                                                        SimulatorConfig config, int num_worlds, int drivers_each,
                                                        int steps);

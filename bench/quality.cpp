@@ -42,13 +42,13 @@ void Quality::add(const Quality& other) {
 
 namespace {
 
-// One image by all methods, [3, height, width] in [0, 1].
+// One image drawn by each method, as [3, height, width] in [0, 1].
 struct MethodImages {
   TruthImage truth;
   std::vector<float> one_sample, grid_2x2, area, oracle;
 };
 
-// Composites exact coverage as alpha: each face covers its area's share of the remaining pixel.
+// Composites exact coverage as alpha: each face takes the share of the remaining pixel that equals its area.
 std::vector<float> composite_areas(ImageDrawer* drawer, std::size_t pixels) {
   std::vector<float> rgb(3 * pixels), left(pixels, 1.0f);
   drawer->visit_fragments([&](int pixel, const PixelCoverage& coverage, Rgb color) {
@@ -62,7 +62,7 @@ std::vector<float> composite_areas(ImageDrawer* drawer, std::size_t pixels) {
   return rgb;
 }
 
-// Returns a drawer with the oracle's faces of one image, ready to draw.
+// Returns an ImageDrawer that is prepared to draw one image as the CPU renderer does.
 ImageDrawer prepared_drawer(const CulledGeometry& pieces, const SceneBatch& scene, const View& view,
                             const Camera& camera, float line_floor_px) {
   Rig rig;
@@ -134,7 +134,8 @@ namespace {
 
 constexpr int kCropWidth_px = 32, kCropHeight_px = 18, kZoom = 8, kGap_px = 4;
 
-// Returns the top left corner of the crop with the largest error of area coverage and 2x2 samples.
+// Returns the top left corner of the crop in which the sum of the errors of area coverage and of 2x2 samples is
+// largest.
 std::pair<int, int> worst_crop(const MethodImages& drawn, int width, int height) {
   const int crop_width = std::min(kCropWidth_px, width), crop_height = std::min(kCropHeight_px, height);
   std::pair<int, int> worst{0, 0};
@@ -166,7 +167,7 @@ void write_quality_figure(const std::string& path, Span<const Snapshot> snapshot
   const int rows = static_cast<int>(snapshots.size());
   const int width = kColumns * (crop_width * kZoom + kGap_px) - kGap_px;
   const int height = rows * (crop_height * kZoom + kGap_px) - kGap_px;
-  // White between the crops, because the images' background is black.
+  // The space between the crops is white, because the background of the images is black.
   std::vector<uint8_t> sheet(static_cast<std::size_t>(3 * width) * static_cast<std::size_t>(height), 255);
   for (int row = 0; row < rows; ++row) {
     const Snapshot& snapshot = snapshots[row];

@@ -37,7 +37,7 @@ class HostTarget final : public RenderTarget {
   HostImages images_;
 };
 
-// The oracle's images of the first views, for comparisons.
+// Images of the first views by the oracle (the CPU renderer), for comparisons.
 class OracleCheck {
  public:
   OracleCheck(const DrivenWorlds& worlds, const RenderCase& render_case)
@@ -51,7 +51,7 @@ class OracleCheck {
                    Span<const View>(worlds.views.data(), static_cast<std::size_t>(num_views_)), expected_.batch());
   }
 
-  /// Adds to the error. Throws Error when `cuda` is out of tolerance.
+  /// Adds the target's errors to error_inout. Throws Error if `cuda` is out of tolerance.
   void compare(RenderTarget* target, ImageError* error_inout) const {
     const HostImages& actual = target->images(num_views_);
     ImageError error;
@@ -104,7 +104,7 @@ std::unique_ptr<RenderTarget> make_host_target(const DrivenWorlds& worlds, const
 RenderMeasurement measure_render(const DrivenWorlds& worlds, const RenderCase& render_case) {
   RenderMeasurement result;
   const auto target = make_target(worlds, render_case);
-  target->fill_unwritten();  // before memory is measured, because the target's memory is not the renderer's
+  target->fill_unwritten();  // before memory is measured, because the target's memory does not belong to the renderer
   result.image_bytes = static_cast<double>(image_bytes_of(render_case));
   PICTURA_CHECK(!render_case.measures_memory || !cuda_device_name().empty(),
                 "bench render: expected a CUDA device to measure memory on, found none");

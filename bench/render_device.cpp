@@ -24,7 +24,7 @@ class DeviceTarget final : public RenderTarget {
   DeviceTarget(const DrivenWorlds& worlds, const RenderCase& render_case)
       : render_case_(render_case), scene_(worlds.simulator->scene()) {
     views_ = view_copy_.assign({worlds.views.data(), static_cast<std::size_t>(render_case.num_views)}, nullptr);
-    // One image per camera defines the sizes and planes.
+    // A host image of each camera defines the sizes and planes.
     HostImages one = images_of(render_case, 1);
     ImageBatch shape = one.batch();
     shape.num_views = render_case.num_views;

@@ -1,4 +1,4 @@
-// Rendering benchmark on a CUDA device.
+// Parts of the rendering benchmark for CUDA devices.
 #pragma once
 
 #include <atomic>
@@ -10,11 +10,12 @@
 
 namespace pictura {
 
-/// Makes a target on the device that measures with stream events: the device's time, including waits for the host
-/// between launches.
+/// Makes a target on the device, which measures time with events on the stream. This time includes the device's waits
+/// for the host between launches.
 std::unique_ptr<RenderTarget> make_device_target(const DrivenWorlds& worlds, const RenderCase& render_case);
 
-/// Device memory that any process has allocated since construction; a thread polls cudaMemGetInfo.
+/// Measures the device memory that all processes together have allocated since construction. A thread polls
+/// cudaMemGetInfo.
 class DeviceMemoryMeter {
  public:
   DeviceMemoryMeter();

@@ -21,9 +21,9 @@ namespace {
 
 constexpr std::size_t kMaxFaults = 100;
 constexpr int kQueries = 32;          // visibility queries per scene
-constexpr int kMaxHiddenAgents = 64;  // in a view's list
+constexpr int kMaxHiddenAgents = 64;  // agents that one view hides
 
-// Random parts of a scene, each with its own stream.
+// Random parts of a scene. Each part has its own stream of random numbers.
 enum class Draw : uint32_t { rigs, world, views, settings, hidden_agents, queries };
 
 RandomStream random_of(const SoakOptions& options, int64_t scene, Draw what) {
@@ -35,7 +35,8 @@ RandomStream random_of(const SoakOptions& options, int64_t scene, Draw what) {
                        .purpose = Purpose::soak});
 }
 
-// Draws few rigs, because kernels are compiled for each: the paper's rig, and three with cameras of random sizes.
+// Returns paper_rig() and three rigs whose cameras have random sizes. There are only four rigs, because kernels are
+// compiled for each rig.
 std::vector<Rig> draw_rigs(const SoakOptions& options) {
   std::vector<Rig> rigs{paper_rig()};
   RandomStream random = random_of(options, 0, Draw::rigs);
@@ -51,7 +52,7 @@ std::vector<Rig> draw_rigs(const SoakOptions& options) {
   return rigs;
 }
 
-// Settings of the renderer and of the call; none of them needs other kernels.
+// Settings of the renderer and of the call. Kernels do not depend on these settings.
 struct Settings {
   RendererConfig config;
   PixelFormat format = PixelFormat::u8;
@@ -68,7 +69,7 @@ Settings draw_settings(const SoakOptions& options, int64_t scene, const std::vec
   const PixelFormat formats[] = {PixelFormat::u8, PixelFormat::f16, PixelFormat::f32};
   settings.format = formats[random.below(3)];
   settings.planes = random.below(2) > 0 ? Planes::all : Planes::none;
-  // Kernels of a rig either randomize cameras or do not.
+  // Kernels are compiled with or without randomization, so each rig always has the same choice.
   if (rig % 2 > 0) {
     settings.config.randomization = scaled(kFullCameraSeverity, static_cast<double>(random.uniform(0, 2)));
     settings.config.randomization.seed = random.bits();
@@ -76,13 +77,13 @@ Settings draw_settings(const SoakOptions& options, int64_t scene, const std::vec
   return settings;
 }
 
-// Views of a scene, and the list of agents of which each view hides a range.
+// Views of a scene, and the list of hidden agents. Each view hides a range of this list.
 struct ViewsOfScene {
   std::vector<View> views;
   std::vector<int32_t> hidden_agents;
 };
 
-// A world of one of the maps, simulated separately for each scene. The scene's number selects map and steps, so that a
+// Scenes, each from a separately simulated world. The scene's number selects the map and the number of steps, so that a
 // scene can be repeated without the scenes before it.
 class Scenes {
  public:
@@ -107,7 +108,8 @@ class Scenes {
     step_randomly(simulator_.get(), config.seed, 1 + random.below(30));
   }
 
-  // Returns views of agents, half of them moved and turned at random; some views hide agents besides their own.
+  // Returns views of agents. Half of the views are moved and turned at random, and some views hide more agents than
+  // their own.
   ViewsOfScene views(int64_t scene) const {
     RandomStream random = random_of(options_, scene, Draw::views);
     const Span<const View> of_agents = simulator_->views();
@@ -164,14 +166,14 @@ class Scenes {
   std::unique_ptr<Simulator> simulator_;
 };
 
-// Adds a fault, up to kMaxFaults.
+// Adds a fault unless there are already kMaxFaults.
 template <typename Fault>
 void add_fault(const Fault& fault, std::vector<Fault>* faults_out, SoakResult* result_out) {
   if (result_out->first_faulty_scene < 0) result_out->first_faulty_scene = fault.scene;
   if (faults_out->size() < kMaxFaults) faults_out->push_back(fault);
 }
 
-// Draws a scene with both renderers and adds the differences.
+// Draws a scene with both renderers, and adds the differences to result_out.
 void compare_images(int64_t scene, const SceneBatch& batch, const std::vector<View>& views, const Settings& settings,
                     Renderer* renderer, Renderer* oracle, SoakResult* result_out) {
   const Rig& rig = settings.config.rig;
@@ -194,7 +196,7 @@ void compare_images(int64_t scene, const SceneBatch& batch, const std::vector<Vi
   }
 }
 
-// Computes visibilities with both renderers and adds the differences.
+// Computes visibilities with both renderers, and adds the differences to result_out.
 void compare_visibility(int64_t scene, const SceneBatch& batch, const std::vector<View>& views,
                         const std::vector<VisibilityQuery>& queries, Renderer* renderer, Renderer* oracle,
                         SoakResult* result_out) {
@@ -205,13 +207,13 @@ void compare_visibility(int64_t scene, const SceneBatch& batch, const std::vecto
   result_out->queries += static_cast<int64_t>(queries.size());
   for (std::size_t i = 0; i < queries.size(); ++i) {
     const bool in_no_frame = std::isnan(expected[i]) && std::isnan(answers[i]);
-    if (in_no_frame || answers[i] == expected[i]) continue;  // exact, because sums are in fixed point
+    if (in_no_frame || answers[i] == expected[i]) continue;  // exact comparison, because the sums are integers
     ++result_out->differing_answers;
     add_fault({scene, queries[i], answers[i], expected[i]}, &result_out->visibility_faults, result_out);
   }
 }
 
-// Simulates a scene, draws it with both renderers and adds the differences.
+// Simulates a scene, draws it with both renderers, and adds the differences to result_out.
 void compare_scene(const SoakOptions& options, const MakeRenderer& make, int64_t scene, const std::vector<Rig>& rigs,
                    Scenes* scenes, SoakResult* result_out) {
   scenes->drive(scene);

@@ -1,5 +1,5 @@
-// Long-running comparison of a renderer with the oracle, over scenes, views, rigs and settings drawn from a seed: of
-// colours (u8, f16 and f32, planar), planes and visibility.
+// Long-running comparison of a renderer with the oracle (the CPU renderer). It compares colours (u8, f16 and f32,
+// planar), planes and visibility. Scenes, views, rigs and settings are random, drawn from a seed.
 #pragma once
 
 #include <functional>
@@ -14,23 +14,23 @@ namespace pictura {
 
 struct SoakOptions {
   std::vector<std::string> maps;
-  int agents = 120, parked_cars = 32;  // maxima of a scene's world
-  int views = 16;                      // per scene
+  int agents = 120, parked_cars = 32;  // maximum numbers in a scene
+  int views = 16;                      // views per scene
   int64_t first_scene = 0;             // scenes are numbered from 0 and depend only on their number and the seed
-  int64_t max_scenes = 0;              // 0: limited by time only
+  int64_t max_scenes = 0;              // 0: only time is limited
   double max_seconds = 480;
   uint64_t seed = 0;
   int num_threads = 0;  // 0: all
 };
 
-/// An image out of tolerance.
+/// An image that is out of tolerance.
 struct SoakFault {
   int64_t scene = 0;
   int view = 0, camera = 0;
   ImageError error;
 };
 
-/// A visibility that differs from the oracle's.
+/// An answer to a visibility query that differs from the oracle's answer.
 struct VisibilityFault {
   int64_t scene = 0;
   VisibilityQuery query;
@@ -38,10 +38,10 @@ struct VisibilityFault {
 };
 
 struct SoakResult {
-  std::string choice;  // choice of the last renderer
+  std::string choice;  // choice_out of the last call of MakeRenderer
   int64_t scenes = 0, images = 0, queries = 0;
   double seconds = 0;
-  ImageError error;  // over all images
+  ImageError error;  // summed over all images
   int64_t images_out_of_tolerance = 0, differing_answers = 0;
   // The first hundred faults of each kind.
   std::vector<SoakFault> faults;
@@ -49,12 +49,13 @@ struct SoakResult {
   int64_t first_faulty_scene = -1;
 };
 
-/// Function that makes the renderer to compare, once per scene, for host memory; may report how it was chosen.
+/// Function that makes the compared renderer, for scenes in host memory. It is called once per scene, and may write how
+/// the renderer was chosen to choice_out.
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const RendererConfig&, std::string* choice_out)>;
 
-/// Compares scene by scene, and calls on_scene(result so far) after each scene. Throws Error naming the scene if making
-/// a renderer or drawing fails, as for gl, which supports no planes, halves or visibility; passes on the UsageError of
-/// `make`.
+/// Compares scene by scene, and calls on_scene(result so far) after each scene. Throws an Error that names the scene if
+/// making a renderer or drawing fails. This happens with `gl`, which supports no planes, halves or visibility. Throws
+/// the UsageErrors of `make` unchanged.
 SoakResult soak(const SoakOptions& options, const MakeRenderer& make,
                 const std::function<void(const SoakResult&)>& on_scene);
 

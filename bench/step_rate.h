@@ -1,4 +1,5 @@
-// Step rate of a simulator on any executor: random actions are in its memory beforehand, and only steps are timed.
+// Step rate of a simulator with any backend. Random actions are written to the simulator's memory beforehand, so that
+// only steps are timed.
 #pragma once
 
 #include <memory>
@@ -8,7 +9,7 @@
 
 namespace pictura {
 
-/// One timed run of steps, including the wait for its end.
+/// One timed run of steps. Its time includes the wait for its end.
 struct StepTiming {
   int64_t steps = 0;
   double elapsed_s = 0;
@@ -16,7 +17,8 @@ struct StepTiming {
   int64_t slot_steps = 0;
 };
 
-/// Steps one simulator with uniform random actions, which are drawn and uploaded beforehand and then used in turn.
+/// Steps one simulator with uniform random actions. A number of sets of actions is drawn and uploaded beforehand, and
+/// steps use the sets cyclically.
 class StepBench {
  public:
   StepBench(Simulator* simulator, uint64_t seed);
@@ -26,8 +28,8 @@ class StepBench {
 
   /// Takes `steps` steps and waits for their end.
   StepTiming run(int64_t steps);
-  /// Takes steps for at least `duration_s`. Waits after every `steps_between_clock_reads` steps, because reading the
-  /// clock requires it.
+  /// Takes steps for at least duration_s seconds. After every steps_between_clock_reads steps, waits for their end and
+  /// reads the clock.
   StepTiming run_for(double duration_s, int64_t steps_between_clock_reads);
 
  private:

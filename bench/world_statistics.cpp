@@ -18,7 +18,7 @@ namespace pictura {
 
 namespace {
 
-/// Quantities in the order of their first count.
+/// Counted quantities, in the order in which they were first counted.
 class Counts {
  public:
   explicit Counts(int episodes) : episodes_(static_cast<size_t>(episodes)) {}

@@ -210,8 +210,7 @@ void MapLayers::paint_crosswalk(GroundPen& pen, const Crosswalk& crosswalk) cons
       along = side / longest;
     }
   }
-  double reach = 0, low = 0,
-         high = 0;  // maximum distance of corners from the centre; range along `along`
+  double reach = 0, low = 0, high = 0;  // maximum distance of corners from the centre; range along `along`
   for (int32_t i = 0; i < count; ++i) {
     const Vector2d from_center = corner(i) - center;
     reach = std::max(reach, from_center.norm());

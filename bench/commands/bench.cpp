@@ -56,7 +56,7 @@ void add_maps_option(CLI::App* command, std::vector<std::string>* maps, const st
 
 std::vector<std::string> named_maps(const std::vector<std::string>& maps) {
   const std::vector<std::string> towns = known_towns();
-  // The town of the measurements in docs/.
+  // The default is the town of the measurements in docs/.
   if (maps.empty()) return {std::binary_search(towns.begin(), towns.end(), "Town01") ? "Town01" : "procedural:1"};
   if (maps != std::vector<std::string>{"towns"}) return maps;
   PICTURA_CHECK(!towns.empty(), "--map towns: {} has none", map_folder());

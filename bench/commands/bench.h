@@ -1,4 +1,4 @@
-// Shared parts of the benchmarks of `pictura bench`: results and their report.
+// Code that the benchmarks of `pictura bench` share: options, results and reports.
 #pragma once
 
 #include <optional>
@@ -13,22 +13,22 @@
 
 namespace pictura {
 
-/// Name of the first processor.
+/// Product name of the first processor.
 std::string processor_name();
-/// Returns options of worlds of 120 agents, with `share` as the share of pedestrians and as that of cyclists.
+/// Returns options for worlds of 120 agents. `share` is both the share of pedestrians and the share of cyclists.
 WorldOptions bench_world(int num_threads, float share, int parked_cars);
 /// Numbers of agents in the single world of `--sweep crowd`.
 constexpr int kCrowds[] = {256, 512, 1024, 2048, 4096};
-/// Describes the agents of a world; its options must set all fractions.
+/// Describes the agents of a world. `world` must set the fractions of all classes.
 std::string population_of(const WorldOptions& world);
 /// Describes the agents of the worlds of `--sweep crowd`.
 std::string population_of_crowds();
 
-/// Adds the option --map, which takes several maps; default_maps describes the default in the help.
+/// Adds the option --map, which accepts several maps. default_maps is the description of the default in the help.
 void add_maps_option(CLI::App* command, std::vector<std::string>* maps,
                      const std::string& default_maps = "Town01 where it is found, else procedural:1");
-/// Returns the maps of --map: `towns` means all maps of the map folder, which must not be empty; no value means the
-/// default.
+/// Returns the maps that --map selects. `towns` selects all maps of the map folder, which must not be empty. No value
+/// selects the default.
 std::vector<std::string> named_maps(const std::vector<std::string>& maps);
 
 /// Throws UsageError unless each backend is known.
@@ -40,9 +40,9 @@ struct BenchContext {
   std::string device = processor_name();
   std::string driver;  // driver of a GPU
 
-  /// Adds a GPU and its driver to the device; does nothing for an empty name.
+  /// Adds a GPU to `device`, and sets its driver. Does nothing for an empty name.
   void add_gpu(const std::string& name, const std::string& driver_name);
-  /// Returns the context as JSON, with the commit of this program.
+  /// Returns the context as JSON, including the commit of this program.
   Json json() const;
 };
 
@@ -54,15 +54,16 @@ struct BenchResult {
 /// Returns name, median (value), unit, mean, min, max and number of repeats.
 Json summary_of(BenchResult result);
 
-/// Prints workload, backend, device and commit for people.
+/// Prints workload, backend, device and commit as text.
 void print_heading(const BenchContext& context);
 
-/// Prints medians and means with minimum and maximum, and their comparison with an earlier report, if there is one.
+/// Prints medians and means with minimum and maximum, as JSON or text. If an earlier report is given, also prints the
+/// comparison with it.
 void report_benchmark(bool json, const BenchContext& context, const std::vector<BenchResult>& results,
                       const std::optional<EarlierReport>& earlier = {});
 
-/// Adds the option --compare, which reads the earlier report: a file that is not a report is refused before the
-/// measurement.
+/// Adds the option --compare, which reads the earlier report. Parsing the option fails for a file that is not a report,
+/// so the error comes before the measurement.
 void add_compare_option(CLI::App* command, std::optional<EarlierReport>* earlier);
 
 /// Adds the subcommand `bench`.

@@ -1,5 +1,5 @@
-// `pictura bench breakdown`: the breakdown of an update's time by size and renderer, as in the paper (section 4, figure
-// and appendix "Training-Step Time Breakdown"), and its figure.
+// `pictura bench breakdown`: measures how an update's time divides into phases, by image size and renderer. The Pictura
+// paper has the same breakdown (section 4, figure and appendix "Training-Step Time Breakdown"). Also draws the figure.
 #include <algorithm>
 #include <optional>
 
@@ -31,7 +31,8 @@ struct BreakdownArguments {
   TrainingCase measured{.config_path = "configs/paper.toml"};
   std::vector<std::string> backends = {"cuda"}, samples = {"1"},
                            sizes = {"32x18", "64x36", "96x54", "192x108", "384x216"};
-  // The paper's text has two readings: 256 agents per world fill one minibatch of 65,536; 256 in total fill half of it.
+  // The paper's text has two readings. With 256 agents per world, an update fills a minibatch of 65,536; with 128 per
+  // world, it fills half of it.
   std::vector<int> agents = {256, 128};
   std::string device = "auto", simulator = "auto";
   int chunk = 2048, checked_views = 8;
@@ -39,7 +40,7 @@ struct BreakdownArguments {
   PlotArguments plot;
 };
 
-// Seconds of an update on the paper's H100 NVL.
+// Seconds of an update in the paper, on an H100 NVL.
 struct PaperRow {
   const char* size;
   double env, rendering, forward, optimisation, other, total;
@@ -50,8 +51,8 @@ constexpr PaperRow kPaperRows[] = {{"32x18", 6.93, 0.84, 0.60, 0.53, 0.28, 9.17}
                                    {"192x108", 6.93, 1.99, 2.68, 3.57, 0.28, 15.45},
                                    {"384x216", 6.92, 3.88, 9.44, 14.08, 0.30, 34.61}};
 
-// Columns of the paper. Its "policy forward" is every pass through the network, in the rollout and in learning. The
-// rest of learning is its "optimization": gradients and the optimizer's steps.
+// Columns of the paper's table. "policy forward" contains every forward pass of the network, in the rollout and in
+// learning. "optimization" contains the rest of learning: gradients and the optimizer's steps.
 struct Column {
   const char* name;
   double (*value)(const UpdateCost& cost);
@@ -69,12 +70,13 @@ constexpr Column kColumns[] = {
 struct BreakdownCase {
   std::string backend, samples, size;
   int agents = 0;
-  // Name of the renderer; gl includes its samples.
+  // Name of the renderer. For gl, it includes the number of samples.
   std::string renderer() const { return backend.starts_with("gl") ? backend + " " + samples : backend; }
   std::string name() const { return fmt::format("{} {} {} agents a world", renderer(), size, agents); }
 };
 
-// Recipe of one update with everything in one minibatch: one epoch, no filter, every slot at every step.
+// Configuration of an update with all transitions in one minibatch: one epoch, no advantage filter, and every slot at
+// every step.
 std::vector<std::string> recipe_of(const BreakdownArguments& arguments) {
   std::vector<std::string> texts{"train.num_steps=128",
                                  "train.update_epochs=1",
@@ -102,7 +104,7 @@ std::vector<std::string> overrides_of(const BreakdownArguments& arguments, const
   return texts;
 }
 
-// Returns all cases at once, so that errors in any arguments are reported before the first case is measured.
+// Returns all cases. All arguments are checked here, so that errors are reported before the first case is measured.
 std::vector<BreakdownCase> breakdown_cases_of(const BreakdownArguments& arguments) {
   std::vector<BreakdownCase> cases;
   for (const std::string& backend : arguments.backends) {
@@ -120,7 +122,7 @@ std::vector<BreakdownCase> breakdown_cases_of(const BreakdownArguments& argument
   return cases;
 }
 
-// Compares images of this renderer and size with the oracle's, see measure_render().
+// Compares images of this renderer and size with those of the CPU renderer, see measure_render().
 ImageError check_images(const BreakdownArguments& arguments, const Config& config, const DrivenWorlds& worlds) {
   RenderCase checked{.backend = config.render.backend,
                      .num_views = static_cast<int>(worlds.views.size()),
@@ -134,7 +136,8 @@ ImageError check_images(const BreakdownArguments& arguments, const Config& confi
   return measure_render(worlds, checked).error;
 }
 
-// Measures with the largest chunk that fits into the device's memory: the given chunk, or a half, a quarter, ... of it.
+// Measures with the largest chunk that fits into the device's memory. It tries the given chunk, then half of it, then a
+// quarter, and so on.
 TrainingMeasurement measure_with_largest_chunk(const BreakdownArguments& arguments, const BreakdownCase& c,
                                                int64_t* chunk_out) {
   for (int64_t chunk = arguments.chunk;; chunk /= 2) {
@@ -149,7 +152,7 @@ TrainingMeasurement measure_with_largest_chunk(const BreakdownArguments& argumen
   }
 }
 
-// Measures the steps of an update by the simulator on the host alone: random actions, no copies to a device.
+// Measures only the simulator's steps of an update, on the host, with random actions and without copies to a device.
 BenchResult measure_host_steps(const BreakdownArguments& arguments, const BreakdownCase& c) {
   const Config config = load_config(arguments.measured.config_path, overrides_of(arguments, c, arguments.chunk));
   std::vector<std::shared_ptr<const RoadMap>> maps;
@@ -184,7 +187,7 @@ void print_table_row(const BreakdownCase& c, const std::vector<BenchResult>& col
   print_result("\n");
 }
 
-/// Columns of the table, with the paper's seconds.
+/// Returns the columns of the table, with the paper's seconds.
 Json breakdown_request() {
   Json parts = Json::array(), paper = Json::object();
   for (const Column& column : kColumns) parts.push_back(column.name);

@@ -1,4 +1,4 @@
-// `pictura bench history`: rates of drawing random agents of random steps from a scene history, compared with rates of
+// `pictura bench history`: measures rates of drawing random agents of random steps from a scene history, and rates of
 // drawing agents of the current scene.
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,5 +1,5 @@
-// `pictura bench map`: processor time to import a map, to load it from the cache, and to compile it for simulators and
-// renderers; and the peak of memory. The default is a town as large as CARLA's largest.
+// `pictura bench map`: measures the processor time to import a map, to load it from the cache, and to compile it for
+// simulators and renderers, and the peak memory. The default map is a town as large as the largest town of CARLA.
 #include <ctime>
 
 #include <fmt/format.h>
@@ -17,7 +17,7 @@ namespace pictura {
 
 namespace {
 
-// A town with 23 MB of OpenDRIVE.
+// A town whose OpenDRIVE file has 23 MB.
 constexpr const char* kLargeTown = "procedural:1:blocks=27x26";
 
 struct MapArguments {
@@ -55,7 +55,7 @@ void run_map(const MapArguments& arguments) {
     for (const Lane& lane : map->lanes) lane_km += 1e-3 * lane.length_m;
     const std::string bytes = encode_map(*map, key);
     begin = processor_s();
-    // The same work as in load_map(): the file's hash, then the cached map.
+    // Does the work of load_map(): computes the file's hash, then decodes the cached map.
     decode_map(bytes, map_cache_key(text.text, {}), "cache");
     measure(&cached);
     compile_map(std::move(map), {});

@@ -1,5 +1,6 @@
-// `pictura bench quality`: PSNR of images against the truth, a ray caster with 1,024 samples per pixel, at the paper's
-// five sizes: of the oracle, of a z-buffer with one sample and 2x2 samples, and of exact coverage used as alpha.
+// `pictura bench quality`: measures the PSNR of images against the truth, a ray caster with 1,024 samples per pixel. It
+// measures the CPU renderer, a z-buffer with one sample and with 2x2 samples, and exact coverage used as alpha, at the
+// five image sizes of the Pictura paper.
 #include <algorithm>
 
 #include <fmt/format.h>
@@ -50,7 +51,7 @@ void run_random(const QualityArguments& arguments) {
     parallel_for(resolve_num_threads(arguments.world.num_threads), arguments.random, [&](int64_t i) {
       throw_if_interrupted();
       const auto seed = arguments.world.seed + static_cast<uint64_t>(i);
-      // Limit for empty images, whose PSNR is infinite.
+      // Replaces the infinite PSNR of empty images.
       constexpr double kMost_db = 99;
       psnr_db[i] = std::min(measure_random_scene(static_cast<RandomKind>(kind), seed).psnr_db(), kMost_db);
     });

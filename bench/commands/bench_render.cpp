@@ -1,5 +1,5 @@
-// `pictura bench render`: rates of drawing images of agents of many worlds, by backend, size and number of egos, and
-// the device memory used.
+// `pictura bench render`: measures rates of drawing the images of agents in many worlds, by backend, image size and
+// number of egos (agents with images), and the used device memory.
 #include <algorithm>
 
 #include <fmt/format.h>
@@ -23,7 +23,7 @@ namespace {
 struct RenderArguments {
   WorldOptions world = bench_world(/*num_threads=*/1, /*share=*/0, /*parked_cars=*/0);
   std::vector<std::string> maps, backends = {"cpu"}, sizes, samples = {"1"};
-  std::vector<int> egos, crowds = {0};  // crowds: agents per world; 0: as in `world`
+  std::vector<int> egos, crowds = {0};  // crowds: agents per world; 0: the number in `world`
   std::string sweep, format = "u8";
   int patch_px = 0;  // 0: planar images
   int checked_views = 8;
@@ -32,11 +32,11 @@ struct RenderArguments {
   std::optional<EarlierReport> earlier;
 };
 
-// Values that sweeps over the other quantity hold fixed.
+// Fixed values: sweeps over sizes use kSweptEgos, and sweeps over egos use kSweptSize.
 constexpr int kSweptEgos = 2048;
 constexpr const char* kSweptSize = "96x54";
 
-// Applies a sweep: the paper's cases and larger ones, see docs/developer/benchmarks.md.
+// Sets the cases of a sweep: those of the Pictura paper and larger cases, see docs/developer/benchmarks.md.
 void apply_sweep(RenderArguments* arguments) {
   const std::string& sweep = arguments->sweep;
   if (sweep.empty()) return;
@@ -96,22 +96,22 @@ RenderCase case_of(const RenderArguments& arguments, const std::string& backend,
 }
 
 struct NamedCase {
-  std::string renderer, size;  // the backend, including its samples if it has any
-  int crowd = 0;               // agents per world, where a sweep sets them
-  RenderCase measured;         // 0 views: all spawned agents
+  std::string renderer, size;  // the backend, including its number of samples if it has samples
+  int crowd = 0;               // agents per world if a sweep sets them
+  RenderCase measured;         // if num_views is 0, all spawned agents have views
   std::string name() const {
     const std::string egos = fmt::format("{} {} {} egos", renderer, size, measured.num_views);
     return crowd > 0 ? fmt::format("{} of {} agents", egos, crowd) : egos;
   }
 };
 
-// Returns all cases at once, so that errors in any arguments are reported before the first case is measured.
+// Returns all cases. All arguments are checked here, so that errors are reported before the first case is measured.
 std::vector<NamedCase> render_cases_of(const RenderArguments& arguments) {
   check_backends(arguments.backends, renderer_names());
   std::vector<NamedCase> cases;
   for (const std::string& backend : arguments.backends) {
     for (const std::string& samples : arguments.samples) {
-      // Backends other than gl compute exact coverage, once for all numbers of samples.
+      // Backends other than gl compute exact coverage, so they are measured only once for all numbers of samples.
       const bool takes_samples = backend.starts_with("gl");
       if (!takes_samples && samples != arguments.samples.front()) continue;
       for (const std::string& size : arguments.sizes) {
@@ -180,7 +180,7 @@ void run_render(RenderArguments arguments) {
   };
   DrivenWorlds worlds;
   std::vector<BenchResult> results;
-  std::vector<std::string> choices;  // choice of each renderer in its last case
+  std::vector<std::string> choices;  // how each renderer was chosen in its last case
   for (std::size_t i = 0; i < cases.size(); ++i) {
     RenderCase& measured = cases[i].measured;
     if (i == 0 || cases[i].crowd != cases[i - 1].crowd) worlds = drive(cases[i].crowd);
@@ -200,7 +200,7 @@ void run_render(RenderArguments arguments) {
           arguments.patch_px > 0 ? fmt::format(" in patches of {} px", arguments.patch_px) : "",
           arguments.planes ? " and planes" : "", world.num_threads, fmt::join(choices, "; ")),
       .backend = fmt::format("{}", fmt::join(arguments.backends, ","))};
-  // In host memory, any driver may run gl:egl; the reported choice contains its name.
+  // If images are in host memory, gl:egl may run on any driver; the reported choice contains the driver's name.
   auto is_of_cuda_device = [](const NamedCase& each) {
     return each.measured.backend == "cuda" || !each.measured.config.device.is_host();
   };

@@ -1,5 +1,5 @@
-// `pictura bench scenes`: number of recorded scenes per minute that a protocol evaluates, including the loading of
-// scenes.
+// `pictura bench scenes`: measures how many recorded scenes an evaluation protocol evaluates per minute, including the
+// loading of the scenes.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 

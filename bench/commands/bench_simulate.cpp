@@ -1,5 +1,5 @@
-// `pictura bench simulate`: step rates of executors, by backend, number of worlds and agents per world, with and
-// without entity sets; and the cost of an agent-step, as a figure.
+// `pictura bench simulate`: measures step rates of simulators, by backend, number of worlds and agents per world, with
+// and without entity sets (observations as vectors). Also draws the cost of an agent-step as a figure.
 #include <algorithm>
 
 #include <fmt/format.h>
@@ -23,7 +23,8 @@ namespace pictura {
 namespace {
 
 struct SimulateArguments {
-  // Vehicles alone, as in the simulators with which rates are compared; options set the shares of other classes.
+  // Only vehicles by default, as in the simulators with which rates are compared. Options set the shares of other
+  // classes.
   WorldOptions world = bench_world(/*num_threads=*/1, /*share=*/0, /*parked_cars=*/0);
   std::vector<std::string> maps, backends = {"cpu"};
   int num_worlds = 0, slots = 0;
@@ -33,14 +34,14 @@ struct SimulateArguments {
   std::optional<EarlierReport> earlier;
 };
 
-/// Worlds that are measured together.
+/// Worlds of one simulator, which are measured together.
 struct SimulateCase {
   std::string name;  // name of the worlds
   std::vector<WorldSpec> worlds;
   bool vector_observations = true;
 };
 
-/// Equal worlds, on the maps in turn.
+/// Returns worlds with equal numbers of agents. They use the maps cyclically.
 SimulateCase equal_worlds(int num_worlds, int agents, int num_maps) {
   SimulateCase result{.name = fmt::format("{} worlds of {} agents", num_worlds, agents)};
   for (int w = 0; w < num_worlds; ++w) {
@@ -76,7 +77,8 @@ std::vector<SimulateCase> simulate_cases_of(const SimulateArguments& arguments) 
   return cases;
 }
 
-/// Takes some steps of both simulators. Throws Error unless the CPU's simulator reaches the same state, bit for bit.
+/// Takes some steps with `simulator` and with the CPU simulator. Throws Error unless both reach bitwise identical
+/// states.
 void check_against_oracle(const SimulatorConfig& config, const CompiledMaps& maps, const std::vector<WorldSpec>& worlds,
                           Simulator* simulator, StepBench* bench) {
   constexpr int64_t kSteps = 16;

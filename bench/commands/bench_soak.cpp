@@ -1,4 +1,4 @@
-// `pictura bench soak`: compares a renderer with the oracle for minutes, on random scenes of a seed.
+// `pictura bench soak`: compares a renderer with the CPU renderer for minutes, on random scenes from a seed.
 #include <algorithm>
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
-// `pictura bench train`: whole updates of a configuration: rates, shares, seconds by phase, device memory; and figures
-// of rates on several GPUs, as measured by scripts/gpu_ranks.
+// `pictura bench train`: measures whole updates of a configuration: rates, shares, seconds by phase and device memory.
+// Also draws figures of rates on several GPUs, which scripts/gpu_ranks measures.
 #include <fmt/format.h>
 
 #include "pictura/bench/commands/bench.h"
@@ -20,8 +20,8 @@ struct TrainArguments {
   PlotArguments plot;
 };
 
-// Adds the kernels of the profiled update: the time of all kernels and copies, the wall time without any of them, and
-// the longest kernels. Kernels run in sequence, on one stream.
+// Adds the kernels of the profiled update: the time of all kernels and copies, the wall time in which none of them ran,
+// and the longest kernels. Kernels run in sequence, on one stream.
 void add_kernels(const TrainingMeasurement& measurement, std::vector<BenchResult>* results_inout) {
   double all_s = 0;
   int64_t launches = 0;

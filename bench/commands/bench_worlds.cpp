@@ -1,4 +1,4 @@
-// `pictura bench worlds`: distributions over many episodes of each map: agents by class, refusals by reason,
+// `pictura bench worlds`: measures distributions over many episodes on each map: agents by class, refusals by reason,
 // unreachable goals, infractions of a random policy, and results of the lane keeper.
 #include <fmt/format.h>
 

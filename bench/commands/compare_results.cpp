@@ -14,7 +14,7 @@ namespace pictura {
 
 namespace {
 
-/// Direction of improvement of a unit: 1 if greater is better, -1 if smaller is better, 0 for neither.
+/// Direction of improvement of a unit: 1 if greater is better, -1 if smaller is better, 0 if neither is better.
 int direction_of(const std::string& unit) {
   if (unit.ends_with("_per_s")) return 1;
   return unit == "s" || unit == "ms" || unit == "GB" || unit == "GiB" ? -1 : 0;

@@ -1,5 +1,5 @@
-// Comparison of a measurement with an earlier result of the same benchmark: ratios of medians with the spread of their
-// repeats, to detect regressions.
+// Comparison of a measurement with an earlier result of the same benchmark, to detect regressions. It compares ratios
+// of medians with the spread of the repeats.
 #pragma once
 
 #include <string>
@@ -9,32 +9,33 @@
 
 namespace pictura {
 
-/// Comparison of a result with the earlier result of the same name.
+/// Change of a result against the earlier result of the same name. undirected: the unit has no better direction.
 enum class Change { better, worse, within_spread, undirected };
 
 struct Comparison {
   std::string name, unit;
   double before = 0, after = 0;  // medians
   double ratio = 0;              // after / before
-  double low = 0, high = 0;      // bounds of the ratio from the extremes of both: min / max, max / min
+  double low = 0, high = 0;      // bounds of the ratio: min(after) / max(before), max(after) / min(before)
   Change change = Change::undirected;
 };
 
-/// Compares rows of `name`, `value`, `unit`, `min` and `max` of two reports, by name; rows of only one report are
-/// omitted. Rates (units "..._per_s") are better when greater, times and memory (s, ms, GB, GiB) when smaller; other
-/// units have no direction. A change counts if the ranges of both rows do not overlap.
+/// Compares the rows of two reports that have the same `name`; rows with a name in only one report are omitted. Rows
+/// also have the keys `value`, `unit`, `min` and `max`. Rates (units "..._per_s") are better if greater; times and
+/// memory (s, ms, GB, GiB) are better if smaller; other units have no direction. A row is better or worse only if the
+/// ranges from min to max do not overlap.
 std::vector<Comparison> compare_results(const Json& before_rows, const Json& after_rows);
 
-/// An earlier report: output of `--json`.
+/// An earlier report, which a benchmark printed with --json.
 class EarlierReport {
  public:
   /// Throws Error naming the file if it cannot be read or is not a benchmark report.
   explicit EarlierReport(const std::string& path);
 
-  /// Adds "comparison" to a report: file, commit and device of the earlier report, whether workload and device are
-  /// equal, and the ratios.
+  /// Adds the key "comparison" to a report. It contains the file, commit and device of the earlier report, whether
+  /// workload and device are equal, and the ratios.
   void add_comparison(Json* report_inout) const;
-  /// Prints the ratios for people, after a warning if the workload or the device differs.
+  /// Prints the ratios as text, after a warning if the workload or the device differs.
   void print_comparison(const Json& report) const;
 
  private:

@@ -14,8 +14,8 @@ namespace pictura {
 
 namespace {
 
-// Bound on the initial KL divergence: bf16 arithmetic stays a hundred times below it; other images or observations are
-// far above it.
+// Bound on the KL divergence of the unchanged policy. With bf16 arithmetic, the divergence is a hundred times smaller;
+// with wrong images or observations, it is far larger.
 constexpr double kMaxFirstKl = 0.01;
 
 // A folder that is removed with all its files.

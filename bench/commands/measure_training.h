@@ -1,4 +1,5 @@
-// Shared parts of `pictura bench train` and `pictura bench breakdown`: updates of a configuration and their costs.
+// Code that `pictura bench train` and `pictura bench breakdown` share: trains some updates of a configuration and
+// measures their costs.
 #pragma once
 
 #include <string>
@@ -20,18 +21,18 @@ struct TrainingCase {
 
 struct TrainingMeasurement {
   std::vector<UpdateCost> updates;  // after the warm-up
-  UpdateCost profiled;              // the update with timed kernels; their times follow
+  UpdateCost profiled;              // the additional update, in which `kernels` were timed
   std::vector<KernelTime> kernels;
   TrainReport report;
 };
 
 /// Trains in a temporary folder. The learning rate stays constant, so that no schedule ends. Throws Error if an update
-/// took no agent-step or no minibatch. Throws Error if the policy, before its parameters change, gives actions other
-/// probabilities than in the rollout, which shows that it did not get the agents' observations. Throws the exceptions
-/// of train().
+/// took no agent-step or no minibatch. Throws Error if the unchanged policy gives actions other probabilities during
+/// learning than during the rollout, because it then did not get the agents' observations. Throws the exceptions of
+/// train().
 TrainingMeasurement measure_training(const TrainingCase& training_case);
 
-/// Wall time of an update, and its part outside all phases.
+/// Wall time of an update in seconds, and the part of it that is outside all phases.
 double wall_s(const UpdateCost& cost);
 double other_s(const UpdateCost& cost);
 inline double phase_s(const UpdateCost& cost, Phase phase) { return cost.phases_s[static_cast<size_t>(phase)]; }

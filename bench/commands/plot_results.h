@@ -1,5 +1,5 @@
-// Shared parts of benchmarks of rates: options of measurement and report, and charts of earlier results. Charts read
-// JSON output, and files of scripts/gpu_check, which contain several outputs.
+// Code that benchmarks of rates share: options of measurements and reports, and charts of earlier results. Charts read
+// the JSON output of benchmarks, and files of scripts/gpu_check, which contain several such outputs.
 #pragma once
 
 #include <string>
@@ -11,16 +11,17 @@
 
 namespace pictura {
 
-/// Files of results, and the picture to draw.
+/// Arguments of --plot (files of results) and --figure (the picture to draw).
 struct PlotArguments {
   std::vector<std::string> results;
   std::string figure;
 };
-/// Adds the options --plot, which `description` documents, and --figure.
+/// Adds the options --plot and --figure. `description` is the help text of --plot.
 void add_plot_options(CLI::App* command, const std::string& description, PlotArguments* arguments);
-/// Whether both options were given. Throws UsageError if only one was given.
+/// Whether --plot and --figure were given. Throws UsageError if only one of them was given.
 bool has_plot_arguments(const PlotArguments& arguments);
-/// Draws a chart of pictura.plot from the results; `request` has further arguments of its function.
+/// Draws a chart from the results with the Python module pictura.plot. `request` contains further arguments of the
+/// chart's function.
 void draw_results(const std::string& chart, const PlotArguments& arguments, Json request = Json::object());
 
 struct RateArguments {

@@ -18,7 +18,7 @@ constexpr float kBlock_m = 60.0f;
 constexpr int kBlocks = 5;
 constexpr float kHalfRoad_m = 7.0f;
 
-// Whether the bounding circles are disjoint, which is sufficient for disjoint footprints.
+// Whether the bounding circles of two boxes are disjoint. Then their footprints are disjoint too.
 bool apart(const AgentBox& a, const AgentBox& b) {
   auto radius = [](const AgentBox& box) { return 0.5f * length(Vec2{box.length_m, box.width_m}); };
   return length(a.center_m.xy() - b.center_m.xy()) > radius(a) + radius(b) + 0.1f;
@@ -34,7 +34,7 @@ Snapshot make_synthetic_town(uint64_t seed, int num_agents) {
   Snapshot town;
   StaticGeometry& geometry = town.geometry;
 
-  // Streets along x and y. at(u, v) is the point u along and v across street `line`.
+  // Streets along x and y. at(u, v) is the point u metres along and v metres across street `line`.
   for (int along_y = 0; along_y < 2; ++along_y) {
     for (int line = 0; line <= kBlocks; ++line) {
       const float offset = static_cast<float>(line) * kBlock_m;
@@ -60,7 +60,7 @@ Snapshot make_synthetic_town(uint64_t seed, int num_agents) {
         for (const float u : {end - 1.5f, end + 1.5f}) {
           add_polyline(&geometry, {at(u, -kHalfRoad_m), at(u, kHalfRoad_m)}, 0.3f, StripKind::crosswalk);
         }
-        // A head on the far side of the crossing for traffic along +u.
+        // A light head on the far side of the crossing, for traffic in the direction +u.
         LightHead head;
         head.position_m = at(end + 2 * kHalfRoad_m + 6, -kHalfRoad_m - 1);
         head.position_m.z = 5;

@@ -1,5 +1,5 @@
 // Synthetic scenes for tests and benchmarks of renderers: streets with lane marks, edges, crosswalks, cars, people,
-// walls and lights, random by seed, with disjoint footprints.
+// walls and lights.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace pictura {
 
-/// Appends the outline of a ring or line as strips of this kind.
+/// Appends a polyline, open or closed, as strips of this kind.
 void add_polyline(StaticGeometry* geometry, std::vector<Vec3> points_m, float width_m, StripKind kind);
 
-/// A town-like scene: a grid of streets 60 m apart, crosswalks and lights at crossings, walls along blocks, and
-/// `num_agents` agents on the streets, without contact.
+/// A scene with its views. make_synthetic_town() makes a random town: a grid of streets 60 m apart, crosswalks and
+/// lights at crossings, walls along blocks, and num_agents agents on the streets, which do not touch each other.
 struct Snapshot {
   StaticGeometry geometry;
   SceneOwner scene;  // one world with handle 0
@@ -21,13 +21,13 @@ struct Snapshot {
 };
 Snapshot make_synthetic_town(uint64_t seed, int num_agents);
 
-/// Makes a town of strips and walls with a crowd of 900 people, seen from above and along it: far more than the
-/// kernels' shared memory can hold.
+/// Makes a town of strips and walls with a crowd of 900 people, seen from above and from the side. The crowd has far
+/// more faces than fit into the shared memory of CUDA kernels.
 Snapshot make_crowd();
 
-/// Four worlds on two towns: the second town, the first without agents, the first, and the second again without lights.
-/// The empty world has one view. Each other world has three views, each of which hides another third of the town's
-/// egos.
+/// Four worlds on two towns: the second town, the first town without agents, the first town, and the second town
+/// without lights. The world without agents has one view. Each other world has three views, each of which hides a
+/// different third of the town's egos.
 struct SyntheticWorlds {
   std::vector<StaticGeometry> maps;
   SceneOwner scene;
@@ -35,27 +35,28 @@ struct SyntheticWorlds {
 };
 SyntheticWorlds make_synthetic_worlds();
 
-/// Makes a bridge across the view, with marks and cars on it, above a road with marks and cars: seen from the road,
-/// from the bridge, and from above.
+/// Makes a bridge with marks and cars over a road with marks and cars, seen from the road, from the bridge, and from
+/// above.
 Snapshot make_bridge();
 
-/// Makes a road that climbs by 12 %, with marks, a stop line, a bridge over it, walls along it, lights, and upright
-/// agents on it: seen uphill, downhill, and across from the bridge.
+/// Makes a road that climbs by 12 %, with marks, a stop line, walls, lights and upright agents, and a bridge over the
+/// road. It is seen uphill, downhill, and from the bridge.
 Snapshot make_hill();
 
-/// Makes cars that have driven into others, in front of a wall that one car has driven into; seen from both sides.
+/// Makes cars that have driven into each other, in front of a wall that one car has driven into. They are seen from
+/// both sides.
 Snapshot make_crash();
 
-/// Returns one camera at the origin of the ego frame, 1.5 m up, facing ahead, with round numbers.
+/// Returns a rig of one camera, 1.5 m above the origin of the ego frame, which faces forward. Its numbers are round.
 Rig simple_rig(int width_px = 100, int height_px = 100, float focal_px = 50);
 
-/// Returns the first camera of the paper's rig alone.
+/// Returns a rig of the first camera of paper_rig().
 Rig front_rig(int width_px = 96, int height_px = 54);
 
 /// Returns four cameras of 97x55, 1x1 and 40x130 pixels.
 Rig mixed_rig();
 
-/// Returns eight cameras of eight sizes, pitched and rolled.
+/// Returns eight cameras of eight sizes, with different pitch and roll angles.
 Rig eight_camera_rig();
 
 /// Difficult scenes, each with a rig: hills, bridges, intersecting solids, odd sizes, one pixel.
@@ -66,7 +67,7 @@ struct HardScene {
 };
 std::vector<HardScene> hard_scenes();
 
-/// All images of a batch, camera by camera: colours as floats, and planes if requested.
+/// All images of a batch, camera by camera: colours as floats, and the optional planes (depth, class, instance).
 struct Outputs {
   std::vector<float> color;
   std::vector<float> depth_m;

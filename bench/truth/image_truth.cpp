@@ -22,7 +22,7 @@ Vector3d point(Vec3 v) { return {v.x, v.y, v.z}; }
 
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
-// A parallelogram or disk in camera coordinates: a face of a solid.
+// A face of a solid in camera coordinates: a parallelogram or a disk.
 struct Facet {
   Vector3d origin, u, v;  // corner and sides; for a disk, centre and two radii
   bool is_disk = false;
@@ -36,7 +36,7 @@ struct Facet {
     const double depth = normal.dot(origin) / along;
     if (!(depth >= kNear_m)) return kFar;
     const Vector3d p = ray * depth - origin;
-    // The sides of a wall on a slope are not at right angles.
+    // The general formula, because the sides of a wall on a slope are not at right angles.
     const double area2 = normal.squaredNorm();
     const double at_u = p.cross(v).dot(normal) / area2, at_v = u.cross(p).dot(normal) / area2;
     if (is_disk) return at_u * at_u + at_v * at_v <= 1 ? depth : kFar;
@@ -46,7 +46,7 @@ struct Facet {
   double radius() const { return is_disk ? u.norm() : 0.5 * std::max((u + v).norm(), (u - v).norm()); }
 };
 
-// The object of a facet: its footprint in the world, and its values in the planes.
+// The object that a facet belongs to: its footprint in the world, and its class and instance.
 struct Solid {
   std::vector<Vector3d> footprint;  // corners
   uint8_t class_id = 0;
@@ -58,19 +58,19 @@ struct Solid {
   }
 };
 
-// A strip as drawn: the cone of directions through its sides and ends, and the strip's plane.
+// A strip after widening: the cone of directions that its sides and ends bound, and the strip's plane.
 struct PaintedStrip {
-  // Inward normals; 0 where the strip is not bounded.
+  // Inward normals of the sides; 0 if a side does not bound the strip.
   Vector3d edge_normal[4] = {Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero()};
-  bool crosses_near = false;          // whether it crosses the near plane; then its extent is decided per ray
+  bool crosses_near = false;          // whether the strip crosses the near plane; each ray is then tested
   Vector3d plane = Vector3d::Zero();  // unit normal
   double offset = 0;
-  double nearest_m = 0, farthest_m = 0;  // minimum and maximum depth of its corners
+  double nearest_m = 0, farthest_m = 0;  // minimum and maximum depth of the strip's corners
   uint32_t rank = 0;
   uint8_t class_id = 0;
   Rgb color;
-  bool from_below = false;   // whether the eye is below its plane
-  std::vector<int> carries;  // indices of the solids on it
+  bool from_below = false;   // whether the camera is below the strip's plane
+  std::vector<int> carries;  // indices of the solids on the strip
   bool carries_solid_of(const Facet& facet) const {
     return std::find(carries.begin(), carries.end(), facet.solid) != carries.end();
   }
@@ -79,11 +79,12 @@ struct PaintedStrip {
       if (normal.dot(ray) < 0) return false;
     }
     if (!crosses_near) return true;
-    // Beyond the horizon, which only widening reaches, the plane is behind the eye.
+    // Widening can extend a strip beyond the horizon of its plane. There, the plane is behind the camera.
     const double of_plane = offset / plane.dot(ray);
     return of_plane >= kNear_m || of_plane <= 0;
   }
-  // Returns the depth of its plane, within half and twice the depths of its corners; the maximum beyond the horizon.
+  // Returns the depth of the strip's plane, clamped to half the minimum and twice the maximum depth of the corners.
+  // Beyond the horizon, it is that maximum.
   double depth(const Vector3d& ray) const {
     const double of_plane = offset / plane.dot(ray);
     const double highest = farthest_m * kWidenedDepth;
@@ -108,7 +109,7 @@ struct Cone {
         middle(ray_at(0.5 * (x_low + x_high), 0.5 * (y_low + y_high))),
         middle2(middle.squaredNorm()),
         spread((corner[3] - corner[0]).norm()) {}
-  // Whether the ball around the facet touches the cone.
+  // Whether the facet's bounding ball touches the cone.
   bool may_intersect(const Facet& facet) const {
     const Vector3d center = facet.center();
     const double along = center.dot(middle) / middle2;
@@ -116,7 +117,7 @@ struct Cone {
     const double reach = facet.radius() + spread * (std::abs(along) + facet.radius());
     return off.squaredNorm() <= reach * reach;
   }
-  // Whether no edge of the strip has the whole cone on its outer side.
+  // Whether the cone may touch the strip: returns false if the whole cone is on the outer side of one edge.
   bool may_intersect(const PaintedStrip& strip) const {
     return std::none_of(std::begin(strip.edge_normal), std::end(strip.edge_normal), [&](const Vector3d& normal) {
       return std::all_of(std::begin(corner), std::end(corner),
@@ -150,7 +151,7 @@ class Eye {
   Vector3d position_;
 };
 
-// Brightness by the shared rule, from double-precision corners.
+// Brightness by face_brightness(), the rule of all renderers, from corners in double precision.
 double brightness(const Vector3d* corners, int count) {
   Vec3 shared[4];
   for (int i = 0; i < count; ++i) {
@@ -219,8 +220,8 @@ void add_light(Tracer* tracer, const Eye& eye, const LightHead& head, LightState
                             static_cast<int>(tracer->solids.size()) - 1});
 }
 
-// Whether two convex outlines overlap on the ground: to separate them along the normal of any side, a displacement of
-// more than a millimetre is needed.
+// Whether two convex outlines overlap on the ground plane: to separate them along the normal of any side, one must move
+// by more than a millimetre.
 bool overlap_on_ground(const std::vector<Vector3d>& a, const std::vector<Vector3d>& b) {
   auto separates = [&](const Vector3d& normal) {
     double low_a = kFar, high_a = -kFar, low_b = kFar, high_b = -kFar;
@@ -244,7 +245,7 @@ double height_above(const std::vector<Vector3d>& outline, const Vector3d& p) {
   return normal.dot(p - outline[0]) / normal.z();
 }
 
-// Returns the solids whose footprint overlaps the strip and whose footprint's centre is at most kStanding_m above or
+// Returns the solids whose footprint overlaps the strip, if the centre of the footprint is at most kStanding_m above or
 // below the strip's plane.
 std::vector<int> solids_on(const Tracer& tracer, const std::vector<Vector3d>& outline) {
   std::vector<int> standing;
@@ -257,16 +258,15 @@ std::vector<int> solids_on(const Tracer& tracer, const std::vector<Vector3d>& ou
   return standing;
 }
 
-// Returns the point where the side of a strip between two corners, one of them before the near plane, crosses that
-// plane.
+// Returns the point where the side of a strip from a to b crosses the near plane.
 Vector3d at_near_plane(const Vector3d& a, const Vector3d& b) {
   return a + (b - a) * ((kNear_m - a.z()) / (b.z() - a.z()));
 }
 
-// Moves the corners of a strip apart to a width on screen, across its centre line, of floor_px at each end in front of
-// the near plane. Depths do not change. Corners: left and right of one end, right and left of the other.
+// Widens a strip to at least floor_px on screen, across its centre line. Only ends in front of the near plane are
+// widened. Depths do not change. The corners are left and right of one end, then right and left of the other end.
 void widen(const Camera& camera, double floor_px, Vector3d* corners) {
-  // Normal of the plane through the eye and the centre line, which on screen is a line with this normal.
+  // Normal of the plane through the camera and the centre line. It also gives the normal of the centre line on screen.
   const Vector3d through_eye = (corners[0] + corners[1]).cross(corners[2] + corners[3]);
   const Eigen::Array2d focal_px{camera.focal_x_px, camera.focal_y_px};
   Eigen::Vector2d across = through_eye.head<2>().array() / focal_px;
@@ -307,13 +307,14 @@ void add_strip(Tracer* tracer, const Eye& eye, const Camera& camera, const Cone&
   painted.crosses_near = nearest->z() < kNear_m;
   painted.nearest_m = std::max(nearest->z(), double{kNear_m});
   painted.farthest_m = farthest->z();
-  // A strip that the eye sees edge-on faces it with the sides that widening gives it.
+  // If the camera sees a strip edge-on, only the widened corners tell which side faces the camera.
   const Vector3d* const facing = painted.crosses_near ? corners : widened;
   const double side = (facing[2] - facing[0]).cross(facing[3] - facing[1]).dot(facing[0]) > 0 ? 1 : -1;
   for (int i = 0; i < 4; ++i) {
     const int next = (i + 1) % 4;
     Vector3d from = widened[i], to = widened[next];
-    // A side that crosses the near plane runs from there to the widened end; a side before the plane bounds nothing.
+    // A side that crosses the near plane runs from the near plane to the widened end. A side that is entirely closer
+    // than the near plane bounds nothing.
     if (from.z() < kNear_m && to.z() < kNear_m) continue;
     if (from.z() < kNear_m || to.z() < kNear_m) {
       (from.z() < kNear_m ? from : to) = at_near_plane(corners[i], corners[next]);
@@ -328,7 +329,7 @@ void add_strip(Tracer* tracer, const Eye& eye, const Camera& camera, const Cone&
   tracer->strips.push_back(painted);
 }
 
-// Potentially visible surfaces in a cone.
+// The surfaces that may be visible in a cone.
 struct Candidates {
   std::vector<const Facet*> facets;
   std::vector<const PaintedStrip*> strips;
@@ -354,7 +355,7 @@ Candidates within(const Candidates& candidates, const Cone& cone) {
 
 // The first hit of a ray.
 struct Surface {
-  const Rgb* color = nullptr;  // null: nothing
+  const Rgb* color = nullptr;  // null if the ray hits nothing
   const Facet* facet = nullptr;
   const PaintedStrip* strip = nullptr;
   double depth = kFar;
@@ -362,7 +363,7 @@ struct Surface {
 
 bool are_equal(double depth, double other) { return std::abs(depth - other) < kEqualDepth * std::min(depth, other); }
 
-// Returns the nearest solid; among equally near solids, the first.
+// Returns the nearest solid. Among equally near solids, returns the first.
 Surface first_solid(const Candidates& candidates, const Vector3d& ray) {
   Surface front;
   bool is_tie = false;
@@ -383,9 +384,9 @@ Surface first_solid(const Candidates& candidates, const Vector3d& ray) {
   return front;
 }
 
-// Returns the nearest surface: the solid or strip of minimum depth, with two exceptions. Of strips whose planes are
-// within kSameLevel_m of each other there, the strip of lowest rank is in front. A strip is behind the solids on it
-// seen from above, and in front of them seen from below.
+// Returns the nearest surface: the solid or strip of minimum depth, with two exceptions. Among strips whose planes are
+// within kSameLevel_m of each other at the hit, the strip of lowest rank is in front. If a solid is on a strip, the
+// solid is in front for a camera above the strip, and the strip is in front for a camera below.
 Surface first_hit(const Candidates& candidates, const Vector3d& ray) {
   Surface front = first_solid(candidates, ray);
   struct Candidate {
@@ -424,7 +425,7 @@ bool TruthImage::blank() const {
 
 namespace {
 
-// One camera's image of one view, ready to be sampled.
+// Sampler of one camera's image of one view.
 class ImageSampler {
  public:
   ImageSampler(const StaticGeometry& geometry, const SceneBatch& scene, const View& view, const Camera& camera,
@@ -452,10 +453,10 @@ class ImageSampler {
     }
   }
 
-  // Calls visit(x, y, candidates) for each pixel, with its potentially visible surfaces.
+  // Calls visit(x, y, candidates) for each pixel, where `candidates` are the surfaces that may be visible in the pixel.
   template <typename Visit>
   void for_each_pixel(Visit&& visit) const {
-    // Culled for the image, then for each row, then for each pixel.
+    // Surfaces are culled for the image, then for each row, then for each pixel.
     const Candidates in_image = within(all_of(tracer_), whole_);
     for (int y = 0; y < camera_.height_px; ++y) {
       const Candidates in_row = within(in_image, cone(0, y, camera_.width_px, y + 1));
@@ -567,7 +568,8 @@ bool is_same_depth(double actual_m, double expected_m) {
 
 namespace {
 
-// Bin k counts errors of more than k - 1 and at most k steps, except for the rounding of floats converted from bytes.
+// Bin k counts errors of more than k - 1 and at most k steps. kRounding_steps allows for the rounding of floats that
+// were converted from bytes.
 constexpr double kStepsOfOne = 8 * 255, kRounding_steps = 1e-3;
 
 std::size_t bin_of(double error) {

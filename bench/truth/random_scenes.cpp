@@ -6,8 +6,8 @@ namespace pictura {
 
 namespace {
 
-// A scene under construction, and its random numbers. Numbers are drawn one per statement or within braces, because
-// compilers evaluate arguments in different orders, and a seed must always give the same scene.
+// A scene under construction, and its random numbers. A statement draws only one number, unless braces fix the order.
+// Compilers evaluate function arguments in different orders, but a seed must always give the same scene.
 class Maker {
  public:
   explicit Maker(uint64_t seed) : random_(seed) {}
@@ -57,7 +57,7 @@ class Maker {
 RandomScene make_near_plane(Maker m) {
   const float slope = m.one_in(3) ? m.between(-0.1f, 0.1f) : 0.0f;
   auto road = [slope](float x, float y) { return Vec3{x, y, slope * x}; };
-  // Strips are level across: on a slope, wide strips would not be on one level.
+  // Strips are horizontal across their width, so wide strips on a slope would not be on one level.
   auto width_m = [&] { return slope == 0 ? m.one_of({0.1f, 0.3f, 0.8f, 2.0f}) : m.one_of({0.1f, 0.3f}); };
   for (int i = 0; i < 6; ++i) {
     const float heading = m.between(0, kPi), ahead_m = m.between(0.3f, 6), behind_m = m.between(0.3f, 6);
@@ -66,7 +66,8 @@ RandomScene make_near_plane(Maker m) {
     m.add_line(road(middle.x - along.x * behind_m, middle.y - along.y * behind_m),
                road(middle.x + along.x * ahead_m, middle.y + along.y * ahead_m), width_m(), kind);
   }
-  // On a slope, beyond the strips: a box on one strip and two strips of several planes may form a cycle.
+  // On a slope, the box is placed beyond the strips, because a box on a strip and two strips in different planes may
+  // occlude each other in a cycle.
   const float box_heading = m.between(0, kTwoPi), left_m = m.between(-2, 2),
               ahead_m = m.between(3, 9) + (slope == 0 ? 0.0f : 8.0f);
   m.add_box(road(ahead_m, left_m), box_heading, {4.2f, 1.8f, 1.5f});
@@ -78,7 +79,8 @@ RandomScene make_near_plane(Maker m) {
 RandomScene make_bridge_from_below(Maker m) {
   const float slope = m.one_in(3) ? m.between(-0.1f, 0.1f) : 0.0f, height_m = m.between(2.5f, 6);
   const float turn = m.between(-1.6f, 1.6f);
-  // Returns a point along the bridge and to its left; the bridge begins ahead of the eye.
+  // Returns the point of the bridge that is `along` metres from its begin and `left` metres to the left. The bridge
+  // begins ahead of the camera.
   auto deck = [&](float along, float left) {
     return Vec3{7 + along * cos_of(turn) - left * sin_of(turn), along * sin_of(turn) + left * cos_of(turn),
                 height_m + slope * along};
@@ -105,7 +107,7 @@ RandomScene make_crashed_boxes(Maker m) {
   const Vec2 middle{m.between(6, 14), m.between(-3, 3)};
   const bool is_aligned = m.one_in(2);
   for (int i = 0; i < 4; ++i) {
-    // Aligned boxes stand one behind the other, so that their sides are in one plane.
+    // Aligned boxes are one behind the other, so that their sides are in one plane.
     const float along = m.between(-3, 3), left = is_aligned ? 0 : m.between(-2, 2);
     const Vec3 at{middle.x + along * cos_of(heading) - left * sin_of(heading),
                   middle.y + along * sin_of(heading) + left * cos_of(heading), 0};
@@ -135,8 +137,8 @@ RandomScene make_intersecting_walls(Maker m) {
   return m.finish({0, 0, 1.5f}, m.between(-0.4f, 0.4f), 0, 0.35f);
 }
 
-// Makes a scene without solids: of a strip and a solid that intersect within a pixel, one is in front in the whole
-// pixel (docs/explanation/image.md).
+// Makes a scene without solids, because if a strip and a solid intersect within a pixel, renderers draw one of them in
+// front in the whole pixel (docs/explanation/image.md).
 RandomScene make_wide_strips(Maker m) {
   for (int i = 0; i < 7; ++i) {
     const float x = m.between(3, 70), y = m.between(-12, 12), turn = m.between(0, kPi);
@@ -154,7 +156,8 @@ RandomScene make_walls_on_strips(Maker m) {
     const Vec3 along{-4 * sin_of(turn), 4 * cos_of(turn), 0}, foot{x, m.between(-5, 5), -depth_m};
     m.add_wall(foot - along, foot + along, depth_m + m.between(0.5f, 3));
   }
-  // Side by side: where two strips overlap and a wall stands on one of them, the three may form a cycle.
+  // Strips are side by side, because two overlapping strips and a wall on one of them may occlude each other in a
+  // cycle.
   const float turn = m.between(-0.8f, 0.8f);
   const Vec3 along{12 * cos_of(turn), 12 * sin_of(turn), 0};
   for (int i = 0; i < 6; ++i) {
@@ -168,7 +171,7 @@ RandomScene make_walls_on_strips(Maker m) {
 }
 
 RandomScene make_level_edges(Maker m) {
-  // Tops at nearly the same height on screen: each is up to 0.15 px above the next.
+  // The tops are at nearly the same height on screen: each top is up to 0.15 px above the next top.
   const float eye_m = 1.5f, slope = m.between(0.05f, 0.2f);
   for (int i = 0; i < 5; ++i) {
     const float x = 6 + 4 * static_cast<float>(i), y = m.between(-4, 4), half_m = m.between(1, 4);

@@ -1,5 +1,6 @@
-// Random small scenes in which two surfaces have nearly the same depth, or a drawing rule has an exception: one kind of
-// scene per rule. `pictura bench quality --random` and tests measure the oracle on these scenes.
+// Small random scenes in which two surfaces have nearly the same depth, or in which an exception of a drawing rule
+// applies. There is one kind of scene per rule. `pictura bench quality --random` and tests measure the CPU renderer on
+// these scenes.
 #pragma once
 
 #include <iterator>
@@ -9,20 +10,21 @@
 namespace pictura {
 
 enum class RandomKind {
-  near_plane,          // strips that cross the near plane, beside and below an eye close to the road
+  near_plane,          // strips that cross the near plane, next to and below a camera close to the road
   bridge_from_below,   // cars and walls on the strips of a bridge or a ramp, seen from the road below
   crashed_boxes,       // boxes driven into each other, with faces in one plane
   intersecting_walls,  // walls that cross each other, partly behind boxes
   wide_strips,         // strips widened by 2 to 8 px up to the horizon and beyond
-  walls_on_strips,     // walls whose lower edge is up to 40 cm below the strips that they stand on
-  level_edges,         // level edges of walls and boxes, one close above the other
+  walls_on_strips,     // walls that stand on strips, with their lower edge up to 40 cm below the strips
+  level_edges,         // level edges of walls and boxes, one closely above the other
 };
 constexpr const char* kRandomKindNames[] = {
     "strips across the near plane", "bridges from below", "crashed boxes", "intersecting walls",
     "strips wider than 2 px",       "walls on strips",    "level edges"};
 constexpr int kNumRandomKinds = static_cast<int>(std::size(kRandomKindNames));
 
-/// A scene with one view and its configuration: one camera of the paper's size and focal length at the view's origin.
+/// A scene with one view, and its configuration: one camera at the view's origin, with the image size and focal length
+/// of paper_rig().
 struct RandomScene {
   Snapshot town;
   RendererConfig config;
