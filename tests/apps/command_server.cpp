@@ -1,8 +1,9 @@
-// Runs the command for many test cases: each is a child of this process, in which the command's libraries are loaded,
-// which takes most of a start. Its standard input is a socket of packets, each with four descriptors, for the standard
-// streams and the answer, and a text: the folder, the environment and the words, as many as a decimal number before
-// each of the last two says, all ended by zero bytes. The answer is the child's process id and, when it has ended, its
-// status, both int32. tests/apps/command_case.py asks.
+// Runs the pictura command for many test cases. Each case runs in a child of this process, which has already loaded the
+// command's libraries; loading them takes most of the time of a start. The standard input is a socket of packets from
+// tests/apps/command_case.py. A packet has four descriptors: the three standard streams, and the descriptor for the
+// answer. Its text consists of strings that end with zero bytes: the working folder, the number of environment
+// variables, the variables, the number of words of the command line, and the words. The answer is the child's process
+// id and, after the child has ended, its status, both as int32.
 #include <array>
 #include <charconv>
 #include <csignal>

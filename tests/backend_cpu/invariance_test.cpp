@@ -1,5 +1,5 @@
-// Changes that leave an image unchanged: moving or mirroring the whole world, dividing lines, adding hidden agents, the
-// number of threads and the order of the input.
+// Changes that must leave an image unchanged: moving or mirroring the whole world, dividing lines, adding hidden
+// agents, and changing the number of threads or the order of the input.
 #include <algorithm>
 #include <cmath>
 #include <random>

@@ -1,4 +1,4 @@
-// Rules for eight lanes at once are bitwise identical to rules for one lane.
+// Rules for eight SIMD lanes give results that are bitwise identical to those of the scalar rules.
 #include <bit>
 #include <cmath>
 #include <random>

@@ -1,4 +1,4 @@
-// The oracle compared with the truth.
+// The oracle (the CPU renderer) compared with the truth (the ray caster).
 #include "pictura/bench/quality.h"
 
 #include <fmt/format.h>

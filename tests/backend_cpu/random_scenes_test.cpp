@@ -1,5 +1,5 @@
-// The oracle compared with the truth in random scenes of each kind of bench/truth/random_scenes.h, for a few seeds.
-// `pictura bench quality --random 200` draws two hundred.
+// The oracle (the CPU renderer) compared with the truth (the ray caster) in random scenes of each kind of
+// bench/truth/random_scenes.h, for a few seeds. `pictura bench quality --random 200` draws 200 scenes of each kind.
 #include "pictura/bench/truth/random_scenes.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// Images of randomized cameras: each equals the image of a rig mounted with the same changes, with the effect on its
-// colours, in any order and at any time of drawing.
+// Images of randomized cameras. Each equals the image of a rig that is mounted with the random changes, after the
+// effect on its colours. The result does not depend on the order or time of drawing.
 #include <algorithm>
 #include <cstring>
 

@@ -1,4 +1,4 @@
-// The CPU renderer's images, computed by hand: rules, sizes, planes, visibility, and errors.
+// The CPU renderer's images compared with values computed by hand: rules, sizes, planes, visibility, and errors.
 #include <algorithm>
 #include <cmath>
 #include <cstring>

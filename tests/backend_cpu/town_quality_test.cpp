@@ -1,5 +1,5 @@
-// The oracle compared with the truth on whole maps: CARLA's towns, with their hills and bridges, and procedural towns.
-// Scenes have moving agents of all classes, walls and lights.
+// The oracle (the CPU renderer) compared with the truth (the ray caster) on whole maps: CARLA's towns, with their hills
+// and bridges, and procedural towns. Scenes have moving agents of all classes, walls and lights.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// The oracle compared with the truth in everything but colours of towns: planes, visibility, the floor on widths, and
-// difficult scenes.
+// The oracle (the CPU renderer) compared with the truth (the ray caster) in everything except colours of towns: planes,
+// visibility, the minimum width of lines, and difficult scenes.
 #include <algorithm>
 #include <cmath>
 

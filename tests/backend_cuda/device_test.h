@@ -1,5 +1,5 @@
-// The fixture of tests that need a CUDA device, and helpers that capture work. Without a device the tests are skipped,
-// or fail with PICTURA_REQUIRE_GPU=1.
+// The fixture of tests that need a CUDA device, and helpers that capture CUDA graphs. Without a device, the tests are
+// skipped; if PICTURA_REQUIRE_GPU is 1, they fail instead.
 #pragma once
 
 #include <cstdlib>
@@ -37,7 +37,7 @@ struct OwnStream {
   OwnStream& operator=(const OwnStream&) = delete;
 };
 
-/// A graph of the work that is put on a stream. Captures reject every call that allocates or waits.
+/// A CUDA graph of the work that `work` enqueues on a stream. The capture rejects every call that allocates or waits.
 struct CapturedGraph {
   cudaGraph_t graph = nullptr;
   cudaGraphExec_t executable = nullptr;
@@ -55,7 +55,8 @@ struct CapturedGraph {
   CapturedGraph& operator=(const CapturedGraph&) = delete;
 };
 
-/// Makes this thread's allocations and device-wide waits errors while it exists: CUDA forbids them during a capture.
+/// While this object exists, allocations and device-wide waits of the calling thread are errors, because a capture is
+/// active and CUDA forbids them during a capture.
 class ForbidAllocations {
  public:
   ForbidAllocations() {

@@ -1,4 +1,4 @@
-// Libraries and contexts: errors for missing libraries, and contexts that restore a thread's previous one.
+// Libraries and contexts: errors for missing libraries, and restoration of a thread's previous context.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

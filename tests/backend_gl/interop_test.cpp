@@ -1,5 +1,5 @@
-// The OpenGL baseline with scenes and images in device memory. Without a GPU these tests are skipped, or fail with
-// PICTURA_REQUIRE_GPU=1.
+// The OpenGL renderer with scenes and images in device memory. Without a GPU, the tests are skipped; if
+// PICTURA_REQUIRE_GPU is 1, they fail instead.
 #include <algorithm>
 
 #include <gmock/gmock.h>

@@ -1,4 +1,5 @@
-// The OpenGL baseline compared with the oracle, within the tolerances of its samples, and its interface.
+// The OpenGL renderer compared with the oracle (the CPU renderer), within tolerances that depend on the number of
+// samples; and the interface of the OpenGL renderer.
 #include <algorithm>
 #include <functional>
 #include <thread>

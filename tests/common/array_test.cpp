@@ -1,4 +1,4 @@
-// Arrays at public interfaces: their description, and errors that name them.
+// Arrays at public interfaces: their descriptions as text, and errors that contain these descriptions.
 #include "pictura/common/array.h"
 
 #include <gmock/gmock.h>

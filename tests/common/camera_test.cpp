@@ -1,4 +1,4 @@
-// The paper's rig, camera axes, and rigs read from files.
+// The rig of the Pictura paper, camera axes, and rigs that are read from files.
 #include "pictura/common/camera.h"
 
 #include <filesystem>

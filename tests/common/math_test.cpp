@@ -1,4 +1,4 @@
-// pictura's transcendental functions against libm in double, over their documented ranges.
+// pictura's transcendental functions compared with those of libm in double precision, over their documented ranges.
 #include "pictura/common/math.h"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// pictura's Philox against Random123's, and properties of streams.
+// pictura's Philox compared with that of the Random123 library, and properties of random streams.
 #include "pictura/common/rng.h"
 
 #include <set>

@@ -1,4 +1,5 @@
-// Scene histories on the host: scenes that are put come back shifted, with the same images as at their step.
+// Scene histories on the host: stored scenes are returned with shifted indices, and give the same images as in their
+// own step.
 #include "pictura/common/scene_history.h"
 
 #include <algorithm>

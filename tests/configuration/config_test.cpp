@@ -1,4 +1,4 @@
-// The configuration: reading, refusing, writing back.
+// Configurations: reading, errors for invalid configurations, and writing.
 #include "pictura/configuration/config.h"
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// Pictures and videos for viewers: single pixels, sizes and files.
+// Pictures and videos: single pixels, sizes and files.
 #include "pictura/drawing/drawing.h"
 
 #include <algorithm>

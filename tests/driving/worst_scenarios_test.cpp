@@ -1,4 +1,4 @@
-// Order in which scenarios of an evaluation are recorded again.
+// Order in which the worst scenarios of an evaluation are recorded again.
 #include <gmock/gmock.h>
 
 #include "pictura/driving/replay_scenarios.h"

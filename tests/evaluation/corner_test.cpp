@@ -1,4 +1,4 @@
-// Blind corners: found and matched states, takeovers and their controls, and the means.
+// The probe of blind corners: states that it finds and matches, takeovers and their controls, and means.
 #include "pictura/evaluation/probes/corner.h"
 
 #include <cmath>

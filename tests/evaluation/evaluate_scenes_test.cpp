@@ -1,5 +1,5 @@
-// Evaluations in recorded scenes: the same results as a simulator driven by hand, for any batches, and the treatment of
-// scenes that cannot be used.
+// Evaluations in recorded scenes give the results of a simulator that the test drives itself, whatever the batches.
+// Also the treatment of scenes that cannot be used.
 #include "pictura/evaluation/evaluate_scenes.h"
 
 #include <cstring>

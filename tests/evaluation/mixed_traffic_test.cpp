@@ -1,4 +1,4 @@
-// Mixed traffic: the driver of each vehicle, and the counts of each driver's row.
+// Mixed traffic: the driver of each vehicle, and the counts in each driver's row of the results.
 #include "pictura/evaluation/mixed_traffic.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Tracked pedestrian: found paths, the controls that could fail, and the means.
+// The probe of a tracked pedestrian: paths that it finds, controls that could fail, and means.
 #include "pictura/evaluation/probes/pedestrian.h"
 
 #include <cmath>

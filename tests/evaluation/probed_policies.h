@@ -1,4 +1,5 @@
-// Small policies for probes, and common tests of all probes.
+// Small policies for the tests of probes (experiments that measure how policies respond), and tests that all probes
+// share.
 #pragma once
 
 #include <initializer_list>
@@ -14,13 +15,13 @@
 
 namespace pictura::test {
 
-constexpr size_t kAgent = 0, kVectorized = 1, kLikeForLike = 2;  // in the order of policies_
+constexpr size_t kAgent = 0, kVectorized = 1, kLikeForLike = 2;  // indices in policies_
 
-/// A policy that reads images, and two that read vectors, practically untrained: one update each on the town with
-/// walls.
+/// One policy that reads images, and two that read vectors. They are practically untrained: each has learnt from one
+/// update on the town with walls.
 class ProbedPolicies : public ::testing::Test {
  protected:
-  // Created by the first test, whose name the folder has.
+  // The first test trains the policies; its name is part of the folder's name.
   void SetUp() override {
     if (folder_) return;
     folder_ = new ScratchFolder;
@@ -36,7 +37,7 @@ class ProbedPolicies : public ::testing::Test {
     folder_ = nullptr;
   }
 
-  /// Selects all three policies, in six scenes of two towns.
+  /// Sets options: all three policies, in six scenes of two towns.
   static void ask(ProbeOptions* options) {
     options->policies = policies_;
     options->worlds.maps = {"procedural:1", "procedural:2"};
@@ -65,8 +66,8 @@ inline bool same_bits(const ProbeResults& a, const ProbeResults& b) {
   return true;
 }
 
-/// Tests of one probe. Kind defines Options and Results, kCases (the number of cases in most tests), set_cases(cases,
-/// &options), probe(options), and is_same(results, results).
+/// Tests of one probe. The parameter Kind must define Options, Results, kCases (the number of cases in most tests),
+/// set_cases(cases, &options), probe(options), and is_same(results, results).
 template <typename Kind>
 class ProbeTest : public ProbedPolicies {
  protected:
@@ -99,7 +100,8 @@ class ProbeTest : public ProbedPolicies {
       EXPECT_TRUE(Kind::is_same(probe(o), results())) << batch;
     }
   }
-  /// Checks that seeds matter. Returns the results of the first of two seeds: cases of one policy in one scene.
+  /// Checks that different seeds give different results, in cases of one policy in one scene. Returns the results of
+  /// the first seed.
   static Results expect_seeds_to_decide(int64_t cases) {
     Options o = options(cases);
     o.policies = {policies_[kAgent]};

@@ -1,5 +1,5 @@
-// The realism score by hand: each feature, likelihoods, files of rollouts. tests/python/test_realism.py compares it
-// with a second implementation.
+// The realism score compared with values computed by hand: each feature, likelihoods, and files of rollouts.
+// tests/python/test_realism.py compares the score with a second implementation.
 #include "pictura/evaluation/realism.h"
 
 #include <cmath>

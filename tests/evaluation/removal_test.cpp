@@ -1,4 +1,4 @@
-// Counterfactual removal: the controls that could fail, and the means.
+// The probe of counterfactual removal: controls that could fail, and means.
 #include "pictura/evaluation/probes/removal.h"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Robust protocol: which conditions apply to a driver, and that each is the evaluation that it names.
+// The robust protocol: which conditions apply to a driver, and whether each condition is the evaluation that it names.
 #include "pictura/evaluation/robust_protocol.h"
 
 #include <algorithm>

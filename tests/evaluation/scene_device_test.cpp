@@ -1,4 +1,4 @@
-// Evaluations in recorded scenes on a CUDA device give the results of the host. Skipped without a device, see
+// Evaluations in recorded scenes on a CUDA device give the results of the host. Skipped without a device, as in
 // device_test.cpp.
 #include <fmt/format.h>
 

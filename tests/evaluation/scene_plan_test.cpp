@@ -1,4 +1,4 @@
-// Protocols of recorded scenes: their settings as data, and the roles that follow from them.
+// Protocols of recorded scenes: their settings, and the roles of agents that follow from the settings.
 #include "pictura/evaluation/scene_plan.h"
 
 #include <gmock/gmock.h>

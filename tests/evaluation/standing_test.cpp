@@ -1,4 +1,5 @@
-// Standing vehicles: waits at red lights and the distance moved in them, time in reverse, and vehicles that are stuck.
+// Standing vehicles: waits at red lights, the distance moved during these waits, time in reverse, and vehicles that are
+// stuck.
 #include "pictura/evaluation/standing.h"
 
 #include <gtest/gtest.h>

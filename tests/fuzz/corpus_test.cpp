@@ -1,4 +1,5 @@
-// Runs the fuzzers' corpus in every test run: each file, and mutations of it, gives a map or an Error in bounded time.
+// The fuzzers' corpus, run in every test run: each file, and each mutation of a file, gives a map or an Error in
+// bounded time.
 #include <algorithm>
 #include <ctime>
 #include <filesystem>

@@ -1,4 +1,4 @@
-// The functions behind the fuzz targets; the corpus test uses them too.
+// Functions that the fuzz targets of maps and the corpus test call.
 #pragma once
 
 #include <cstdint>
@@ -6,17 +6,17 @@
 
 namespace pictura::test {
 
-/// Imports the bytes as an OpenDRIVE file, strictly and with repairs, and exercises the result: its geometry and a
-/// round trip through the cache. Returns whether the strict importer made a map; Error is an accepted outcome. Other
-/// exceptions propagate, and a map that the cache does not restore exactly aborts.
+/// Imports the bytes as an OpenDRIVE file, both strictly and with repairs. Then makes the map's geometry, and writes
+/// and reads the map through the cache. Returns whether the strict importer made a map; it may throw Error instead.
+/// Other exceptions propagate. If the cache does not restore the map exactly, the process aborts.
 bool fuzz_opendrive(std::string_view bytes);
 
-/// Reads bytes as a Lanelet2 file. Returns whether it is a map.
+/// Reads bytes as a Lanelet2 file. Returns whether they are a map.
 bool fuzz_lanelet2(std::string_view bytes);
 
-/// Reads a cached map. The first byte selects the kind of the rest: `f` a whole file, `p` a payload that gets a
-/// matching header, `e` edits of five bytes each (a position and a value) of a valid payload. Returns whether it is a
-/// map.
+/// Reads a cached map. The first byte selects the kind of the remaining bytes. `f`: a whole file. `p`: a payload, to
+/// which a matching header is added. `e`: edits of a valid payload, of five bytes each (a position and a value).
+/// Returns whether they are a map.
 bool fuzz_map_cache(std::string_view bytes);
 
 }  // namespace pictura::test

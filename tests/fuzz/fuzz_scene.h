@@ -1,4 +1,4 @@
-// Functions behind the fuzz targets of recorded scenes, shared with tests that run them on changed fixtures.
+// Functions that the fuzz targets of recorded scenes call. Tests also call them, with mutated fixtures.
 #pragma once
 
 #include <map>
@@ -7,17 +7,19 @@
 
 namespace pictura::test {
 
-/// Reads bytes as a scene file of that name. The bytes of "payload" are one WOMD record without its checksums, those of
-/// "fields" a file *.scenario in the form of fuzz_scene_cache(). An accepted scene is compared with the scene that its
-/// cache restores, and is drawn; its traffic is tested against its edges. Returns whether the scene was accepted. Any
-/// exception but Error is a fault of the reader.
+/// Reads bytes as a scene file with this name. If the name is "payload", the bytes are one record of the Waymo Open
+/// Motion Dataset (WOMD) without its checksums. If it is "fields", they are a *.scenario file in the form of
+/// fuzz_scene_cache(). An accepted scene is compared with the scene that the cache restores, and is drawn, and its
+/// tracks are tested against its road edges. Returns whether the scene was accepted. Any exception except Error is a
+/// fault of the reader.
 bool fuzz_scene(std::string_view bytes, const std::string& name);
 
-/// Reads bytes as a cached scene: 'p' and bytes are its fields, after a valid header; 'e' and triples of a position
-/// (16 bits) and a byte edit valid fields; other bytes are read as they are.
+/// Reads bytes as a cached scene. If the first byte is 'p', the others are the fields after a valid header. If it is
+/// 'e', the others edit valid fields, in triples of a position (16 bits) and a new byte. Otherwise, all bytes are read
+/// unchanged.
 bool fuzz_scene_cache(std::string_view bytes);
 
-/// Returns small fixture scenes in every format, by file name, as first inputs.
+/// Returns small fixture scenes in every format, by file name. Fuzzers use them as first inputs.
 std::map<std::string, std::string> scene_seeds();
 
 }  // namespace pictura::test

@@ -1,4 +1,5 @@
-// The seeds of the scene fuzzers and mutations of them, in every test run: each gives a scene or an Error.
+// The first inputs of the scene fuzzers and mutations of these inputs, run in every test run: each gives a scene or an
+// Error.
 #include <algorithm>
 #include <random>
 #include <string>

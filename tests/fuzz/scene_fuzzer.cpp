@@ -1,5 +1,6 @@
-// libFuzzer target: any bytes as a recorded scene. PICTURA_FUZZ_NAME, a file's name, selects the format. Where
-// $PICTURA_FUZZ_SEEDS names a folder, small scenes of that format are first written into the folder as first inputs:
+// libFuzzer target: any bytes as a recorded scene. The macro PICTURA_FUZZ_NAME, a file's name, selects the format. If
+// the environment variable PICTURA_FUZZ_SEEDS names a folder, the program first writes small scenes of that format to
+// the folder, as first inputs:
 //   PICTURA_FUZZ_SEEDS=seeds build/fuzz/tests/fuzz/gpudrive_fuzzer NEW seeds
 #include <cstdint>
 #include <cstdlib>

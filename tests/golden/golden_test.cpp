@@ -1,8 +1,9 @@
-// Golden images: each scene of this folder, drawn by a backend, compared with its PNG by the oracle; and the oracle
-// compared with the truth.
+// Golden images. Each scene of this folder is drawn by a backend and compared with its PNG, which the oracle (the CPU
+// renderer) has drawn. The oracle is also compared with the truth (the ray caster).
 //   golden_test [--backend NAME] [--out DIR] [GoogleTest's options]
 //   golden_test --update     redraws the pictures with the oracle
-// A failure writes DIR/SCENE_{expected,actual,difference}.png, enlarged, the difference with eightfold contrast.
+// A failure writes enlarged pictures to DIR/SCENE_{expected,actual,difference}.png. The difference has eightfold
+// contrast.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>

@@ -1,4 +1,4 @@
-// Occlusion by walls at a hand-made crossing against values computed by hand, and plausible counts in the towns.
+// Occlusion by walls at a hand-made crossing compared with values computed by hand, and plausible counts in towns.
 #include "pictura/map/blind_approaches.h"
 
 #include <fmt/format.h>

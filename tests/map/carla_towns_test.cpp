@@ -1,4 +1,4 @@
-// CARLA's eight towns: counts known from their files, and properties of any map made from them.
+// CARLA's eight towns: counts that are known from their files, and properties that every map must have.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-// A car driven along the middle of every lane of a map, and the places where it touches road edges.
+// Counts the poses at which a car in the middle of a lane touches road edges.
 #pragma once
 
 #include <algorithm>
@@ -23,8 +23,8 @@ class EdgeGrid {
     grid_ = Grid(boxes, 10.0f);
   }
 
-  /// Whether `test(edge)` holds for an edge at about the height of `p`, within a square of half-size `radius_m` around
-  /// `p`.
+  /// Whether test(edge) is true for any edge at about the height of p, within a square of half-size radius_m around p.
+  /// Also tests some edges slightly outside the square.
   template <typename Test>
   bool any_near(Vec3 p, float radius_m, Test&& test) const {
     const GridView grid = grid_.view();
@@ -45,7 +45,8 @@ class EdgeGrid {
   Grid grid_;
 };
 
-/// Whether a segment intersects the box of half-size (half_length, half_width) around `center`.
+/// Whether an edge intersects a box on the ground plane. The box is centred on `center` and is 2 * half_length long and
+/// 2 * half_width wide.
 inline bool box_intersects(const RoadEdge& edge, Vec3 center, float heading_rad, float half_length, float half_width) {
   const float c = std::cos(heading_rad), s = std::sin(heading_rad);
   auto local = [&](Vec3 p) {
@@ -81,7 +82,8 @@ inline DrivenLanes drive_lanes(const RoadMap& map) {
     for (std::size_t i = 1; i < points.size(); ++i) {
       const LanePoint &a = points[i - 1], &b = points[i];
       for (float u = 0; u < 1; u += 0.5f / (b.s_m - a.s_m)) {
-        // Lanes that open from zero width or taper off are narrower than a car there: five in Town06, one in Town07.
+        // Skips places near which a lane has almost no width, because a car does not fit there. Town06 has five such
+        // lanes, and Town07 has one.
         bool tapers = false;
         for (const LanePoint& near : points) {
           tapers = tapers || (near.width_m < 0.05f && std::abs(near.s_m - a.s_m - u * (b.s_m - a.s_m)) < 30.0f);

@@ -1,5 +1,5 @@
-// Routes, distances, reachability and components of lanes: on a hand-made map, against brute force on random maps, and
-// on towns.
+// Routes, distances, reachability and components of lanes: on a hand-made map, on random maps compared with brute
+// force, and on towns.
 #include "pictura/map/lane_graph.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Lanelet2 maps: small ones whose lanes, edges, paint, lights and limits are known, and broken ones.
+// Lanelet2 maps: small maps whose lanes, edges, paint, lights and limits are known, and invalid maps.
 #include "pictura/map/lanelet2/lanelet2.h"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// A file as large as CARLA's largest towns: 23 MB, several hundred kilometres of lanes. Import, cache and memory stay
-// within their limits, measured in processor time, since other programs share the machine.
+// A file as large as those of CARLA's largest towns: 23 MB, with several hundred kilometres of lanes. Import, cache and
+// memory stay within their limits. Times are processor times, because other programs share the machine.
 #include <ctime>
 #include <string>
 

@@ -1,4 +1,4 @@
-// The map cache: maps are restored bit for bit, any other file is rejected with its reason, and load_map() then imports
+// The map cache: maps are restored bit for bit. Any other file is rejected with a reason, and load_map() then imports
 // the source.
 #include "pictura/map/map_cache.h"
 

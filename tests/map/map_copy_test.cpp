@@ -1,5 +1,5 @@
-// Affine copies of maps: lanes keep their widths and connections, lengths follow the plan, and names mean the same
-// town everywhere.
+// Affine copies of maps: lanes keep their widths and connections, lengths are those of the transformed lines, and a
+// name selects the same town everywhere.
 #include "pictura/map/map_copy.h"
 
 #include <cmath>

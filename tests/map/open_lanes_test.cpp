@@ -1,4 +1,4 @@
-// Roads that end: places where traffic leaves and enters, without road edges in its way.
+// Roads that end: places where traffic leaves and enters the map, without road edges across them.
 #include "pictura/map/open_lanes.h"
 
 #include <cmath>

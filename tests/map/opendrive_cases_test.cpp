@@ -1,4 +1,4 @@
-// Small files of the kinds that other tools write, and their table in docs/reference/map_cases.md.
+// Small files like those that other tools write, and the table of these files in docs/reference/map_cases.md.
 #include <string>
 #include <vector>
 

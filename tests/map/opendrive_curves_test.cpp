@@ -1,4 +1,4 @@
-// Cubic reference lines and banked roads against formulae evaluated by hand.
+// Cubic reference lines and banked roads compared with formulae that are evaluated by hand.
 #include <cmath>
 #include <string>
 #include <vector>

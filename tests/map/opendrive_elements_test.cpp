@@ -1,6 +1,6 @@
-// Effects of each element of OpenDRIVE 1.4 to 1.8 in the importer, found by reading a file with and a file without the
-// element, and their table in docs/reference/opendrive_conformance.md. The versions of an element are those of the
-// standard's schemas.
+// The effect of each element of OpenDRIVE 1.4 to 1.8 in the importer, and the table of these effects in
+// docs/reference/opendrive_conformance.md. The tests read a file with the element and a file without it. The versions
+// of an element are those of the standard's schemas.
 #include <optional>
 #include <set>
 #include <string>

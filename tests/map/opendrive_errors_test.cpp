@@ -1,4 +1,4 @@
-// Malformed OpenDRIVE files give an Error with source, line, road and element: in strict reading, for all faults.
+// Malformed OpenDRIVE files give an Error with source, line, road and element. Strict reading reports all faults.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

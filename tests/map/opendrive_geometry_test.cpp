@@ -1,4 +1,4 @@
-// Lane geometry: small OpenDRIVE files against coordinates computed by hand.
+// Lane geometry of small OpenDRIVE files compared with coordinates computed by hand.
 #include <cmath>
 #include <map>
 

@@ -1,4 +1,4 @@
-// Paint: marks of every type, listed lines, crosswalks, stop lines, parking spaces.
+// Paint: road marks of every type, explicit lines, crosswalks, stop lines and parking spaces.
 #include <cmath>
 #include <string>
 #include <vector>

@@ -1,5 +1,5 @@
-// Faults that have one sensible meaning: each is repaired and recorded by default, and refused by strict reading with
-// file, line, owner and element.
+// Faults with only one sensible meaning. By default, each fault is repaired and recorded. Strict reading instead throws
+// an Error with file, line, owner and element.
 #include <algorithm>
 #include <cmath>
 #include <numbers>

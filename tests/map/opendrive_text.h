@@ -1,5 +1,5 @@
-// OpenDRIVE text for tests: an evaluation of lines, arcs, widths and elevations that shares no code with the writer or
-// the importer, and checks of simple rules of the standard.
+// Evaluation of OpenDRIVE text for tests: of lines, arcs, widths and elevations, and of simple rules of the standard.
+// It shares no code with the writer or the importer.
 #pragma once
 
 #include <string>
@@ -26,18 +26,20 @@ class OpenDriveText {
   std::unordered_map<std::string, pugi::xml_node> roads_;
 };
 
-/// Returns the violated rules of OpenDRIVE 1.4: required attributes, ascending stations, lane ids counted from the
-/// centre, unique ids, links with a target that are mutual, and junction connections that agree with their roads.
+/// Returns the rules of OpenDRIVE 1.4 that the text violates. It checks that required attributes exist, stations
+/// ascend, lane ids count from the centre, ids are unique, links have targets and are mutual, and junction connections
+/// agree with their roads.
 std::vector<std::string> violated_rules(const OpenDriveText& text);
 
 struct Pose {
   double x = 0, y = 0, heading = 0;
 };
 
-/// The pose on a line or an arc, `ds` from its start.
+/// Returns the pose on a line or an arc, ds metres from its start.
 Pose on_geometry(const pugi::xml_node& geometry, double ds);
 
-/// Borders of a lane at an end of its road, with the heading of +s, the height, and the grade along +s.
+/// End of a lane at an end of its road: positions of the inner and outer border, heading of +s, height, and grade along
+/// +s.
 struct LaneEnd {
   double inner_x = 0, inner_y = 0, outer_x = 0, outer_y = 0, heading = 0, z = 0, grade = 0;
 };

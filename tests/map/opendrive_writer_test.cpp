@@ -1,4 +1,4 @@
-// Export: reading the output gives the same map, and exporting it again gives the same text.
+// Export of maps: importing an exported file gives the same map, and exporting that map gives the same text.
 #include <filesystem>
 #include <string>
 

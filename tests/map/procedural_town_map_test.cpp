@@ -1,4 +1,4 @@
-// Procedural towns after import: one connected network that can be driven without obstacles.
+// Procedural towns after import: one connected network of lanes, with no obstacles on them.
 #include <array>
 #include <cmath>
 #include <cstdlib>

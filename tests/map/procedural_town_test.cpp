@@ -1,4 +1,5 @@
-// Procedural towns as text: valid OpenDRIVE whose pieces meet, and the effect of each option.
+// The text of procedural towns: it is valid OpenDRIVE, roads and lanes meet without gaps, and each option has its
+// effect.
 #include "pictura/map/procedural/procedural_town.h"
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// Outlines of hand-made surfaces: lengths, orientation, open ends, levels, gaps; and a brute-force check on random
-// bands.
+// Outlines of hand-made surfaces: lengths, orientation, open ends, levels and gaps. Also a comparison with brute force
+// on random bands.
 #include "pictura/map/road_edges.h"
 
 #include <cmath>

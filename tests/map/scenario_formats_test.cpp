@@ -1,5 +1,5 @@
-// GPUDrive's JSON and PufferDrive's binary layouts: files of our own writers are read as the scene from which they were
-// written, as far as the format allows; faults are reported with file and field.
+// GPUDrive's JSON and PufferDrive's binary layouts. The tests write a scene to a file; reading the file gives the same
+// scene, as far as the format allows. Faults are reported with file and field.
 #include <cmath>
 #include <functional>
 

@@ -1,4 +1,5 @@
-// Rules of conversion from a recording to a scenario, each where it decides; docs/reference/scenario.md lists them.
+// Rules for converting a recording to a scenario; docs/reference/scenario.md lists the rules. Each rule is tested in a
+// case whose result depends on it.
 #include <cmath>
 #include <filesystem>
 #include <numbers>

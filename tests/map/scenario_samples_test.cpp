@@ -1,5 +1,5 @@
-// Scenes of other projects, where available: everything that docs/research/maps.md and the formats' own pages
-// document about them is read.
+// Scenes of other projects, if they are available. Reading them gives everything that docs/research/maps.md and the
+// formats' own pages document.
 #include <cstdlib>
 #include <filesystem>
 #include <string>

@@ -1,5 +1,5 @@
-// WOMD records: records of our own writer are read completely in any order of fields; faults of bytes, fields or files
-// are reported with file, record and field.
+// Records of the Waymo Open Motion Dataset (WOMD). Records that the tests write are read completely, with fields in any
+// order. Faults of bytes, fields or files are reported with file, record and field.
 #include <algorithm>
 #include <cmath>
 #include <cstring>

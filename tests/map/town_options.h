@@ -1,4 +1,4 @@
-// Procedural towns of a seed, a size and a family.
+// Options of procedural towns, from a seed, a size and a family.
 #pragma once
 
 #include <string_view>

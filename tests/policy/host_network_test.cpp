@@ -1,5 +1,5 @@
-// Policies that the host computes without torch against the same that torch computes: released ones in driven worlds,
-// and small ones of every architecture.
+// Policies that the host computes without torch, compared with torch: released policies in simulated worlds, and small
+// policies of every architecture.
 #include "pictura/policy/host_network.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Programs in place of the convolutions: their inputs, their outputs, and gradients.
+// User programs that replace the convolutions of a policy: their inputs, outputs and gradients.
 #include "pictura/policy/image_backbone.h"
 
 #include <fmt/format.h>

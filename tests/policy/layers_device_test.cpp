@@ -1,5 +1,5 @@
-// Layers on a CUDA device against the same layers in double precision on the host: values and every gradient are about
-// as near as those of ATen's own layers on the device.
+// Layers on a CUDA device compared with layers in double precision on the host. The errors of values and of all
+// gradients are about as small as those of ATen's layers on the device.
 #include <gtest/gtest.h>
 
 #include "pictura/policy/layers.h"

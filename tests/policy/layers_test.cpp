@@ -1,5 +1,5 @@
-// Layers on the host: patches of images, the meaning of padding of channels, features of rows, and the host's own
-// passes in single precision against ATen's layers in double.
+// Layers on the host: patches of images, padded channels, and features of rows. Also the library's passes on the host
+// in single precision, compared with ATen's layers in double precision.
 #include "pictura/policy/layers.h"
 
 #include <ATen/Parallel.h>

@@ -1,5 +1,5 @@
-// Policies with their results, for tests of other implementations: policy_reference FOLDER writes for each policy its
-// weights (NAME.safetensors), and inputs with the logits and values of the library's forward pass in fp32
+// Writes policies and their results, for tests of other implementations. For each policy, `policy_reference FOLDER`
+// writes its weights (NAME.safetensors), and inputs with the logits and values of the library's forward pass in fp32
 // (NAME_io.safetensors).
 #include <cstdio>
 #include <string>

@@ -1,4 +1,4 @@
-// The policies: shapes, gradients, masks, initialisation.
+// Policies: shapes, gradients, masks and initialisation.
 #include "pictura/policy/policy.h"
 
 #include <cmath>

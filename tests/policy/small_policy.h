@@ -1,11 +1,12 @@
-// Policies small enough for hundreds of passes.
+// Configurations of policies that are small enough for hundreds of passes.
 #pragma once
 
 #include "pictura/configuration/config.h"
 
 namespace pictura::test {
 
-/// A policy of either modality, with layers of uneven widths. Its images are small, with patches of a pixel.
+/// A policy of either modality (images or vectors), whose layers have different widths. Its images are small, with
+/// patches of one pixel.
 inline PolicySection tiny_section(Modality modality) {
   PolicySection c;
   c.modality = modality;

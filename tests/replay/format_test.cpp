@@ -1,4 +1,4 @@
-// Format of replays: written data are read back, and damage is named.
+// Format of replays: written data are read back, and errors name the damage of a file.
 #include <filesystem>
 #include <random>
 

@@ -1,4 +1,4 @@
-// Server of live pages, its pages and a simulation running concurrently, each in its own threads.
+// Server of live pages. The server, its clients and a simulation run concurrently, each in its own threads.
 #include "pictura/replay/server.h"
 
 #include <array>

@@ -1,4 +1,4 @@
-// A step allocates nothing: every allocation of this binary is counted, and those of one thread's steps are none.
+// Steps on one thread allocate no memory. The test counts all allocations of this program.
 #include <gtest/gtest.h>
 
 #include "pictura/backends/make_simulator.h"

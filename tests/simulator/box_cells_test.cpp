@@ -1,5 +1,5 @@
-// Rules' results through cells of boxes, against a scan of all boxes: crowded worlds, with boxes on the borders of
-// cells, on top of each other, outside the map, and as long as the map's longest.
+// Results of rules that find boxes by grid cells, compared with a scan of all boxes. The worlds are crowded, with boxes
+// on the borders of cells, on top of each other, outside the map, and as long as the longest allowed box.
 #include <cmath>
 #include <utility>
 #include <vector>

@@ -1,4 +1,4 @@
-// The loop that drives simulators: its calls, their order, and what ends the loop.
+// The loop that drives simulators: its calls, their order, and the conditions that end the loop.
 #include "pictura/simulator/drive_steps.h"
 
 #include <cctype>

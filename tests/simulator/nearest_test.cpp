@@ -1,4 +1,4 @@
-// The nearest of many items, compared with sorting all items.
+// Selection of the nearest of many items, compared with sorting all items.
 #include "pictura/simulator/rules/fast/nearest.h"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Every observed number, in random worlds of all maps, compared with observation_reference.h. Also the pieces that
-// both implementations read, compared with the road map that they are cut from.
+// Every observed number, in random worlds of all maps, compared with observation_reference.h. Both implementations read
+// pieces of lines; the tests also compare these pieces with the road map.
 #include "pictura/tests/simulator/observation_reference.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Every number of the observation, recomputed by hand on a straight road.
+// Every number of the observation, compared with values computed by hand on a straight road.
 #include <cmath>
 
 #include <gtest/gtest.h>

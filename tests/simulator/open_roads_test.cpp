@@ -1,4 +1,4 @@
-// Worlds on roads that end: agents start on open lanes, leave where the lanes end, and enter again.
+// Worlds on roads that end: agents start on the roads, leave where lanes end, and enter again.
 #include "pictura/tests/map/open_roads.h"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Pieces in sight found eight at a time, compared with testing one after the other.
+// Search for pieces in sight, eight at a time, compared with a test of each piece.
 #include "pictura/simulator/rules/fast/pieces_in_sight.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Edits of a simulator's agents, drawn by number: moves along and aside, moves onto others, speeds, goals and status.
+// Random edits of a simulator's agents: moves of a few metres, moves onto other agents, speeds, goals and status.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,8 @@
 
 namespace pictura::testing {
 
-/// Edit of about a third of the agents of a state on the host. The simulator can reject no part of it.
+/// Random edit of about a third of the agents of a state on the host. `number` selects the random numbers. All parts of
+/// the edit are valid.
 class RandomEdit {
  public:
   RandomEdit(const AgentStateView& state, int num_slots, uint32_t number) {

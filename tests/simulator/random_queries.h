@@ -1,4 +1,4 @@
-// Observation queries drawn by number, and memory with arbitrary contents for their answers.
+// Random observation queries, and memory for their answers that is filled with unlikely values.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 namespace pictura::testing {
 
-/// Queries of all kinds with their lists, for a simulator on the host. They are for any slots, hide none to many of
-/// their worlds' boxes, and insert none to a few boxes nearby.
+/// Random queries with their lists, for a simulator on the host; `number` selects the random numbers. Each query is for
+/// a random slot, hides up to half of the boxes of the slot's world, and inserts up to three boxes nearby.
 struct RandomQueries {
   RandomQueries(Simulator* simulator, int count, uint32_t number) {
     const SceneBatch& scene = simulator->scene();
@@ -50,7 +50,7 @@ struct RandomQueries {
   std::vector<InsertedBox> inserted;
 };
 
-/// The caller's arrays for `count` observations.
+/// Arrays of a caller for `count` observations.
 class AnswerMemory {
  public:
   AnswerMemory(size_t count, const SimulatorConfig& config)

@@ -1,4 +1,4 @@
-// Worlds of recorded scenes: agents that follow their records, and controllers that take over from records.
+// Worlds of recorded scenes: agents that follow their recorded tracks, and controllers that take over from the tracks.
 #include <filesystem>
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// Bitwise comparison of executors' results, and actions to drive executors with.
+// Bitwise comparison of the results of simulators, and actions for driving simulators.
 #pragma once
 
 #include <cstring>
@@ -17,7 +17,7 @@ bool same_bits(Span<T> a, Span<T> b) {
   return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
 }
 
-/// Returns the name of the first array and element that differ; empty where all bits are equal.
+/// Returns the array, the element and the values of the first difference; empty if all bits are equal.
 inline std::string first_difference(const ObservationView& a, const ObservationView& b) {
 #define X(name, type, rows, features, part, comment)                                                             \
   if (!same_bits(a.name, b.name)) {                                                                              \
@@ -32,7 +32,8 @@ inline std::string first_difference(const ObservationView& a, const ObservationV
   return "";
 }
 
-/// Returns actions that keep most agents driving: mostly no jerk, sometimes any action, keyed by slot and step.
+/// Returns actions that keep most agents driving: usually no jerk, sometimes a random action. Slot and step are the key
+/// of the random numbers.
 inline std::vector<int32_t> mixed_actions(int num_slots, uint32_t step) {
   constexpr int32_t kCoasting = 2 * kNumLatActions + 1;
   std::vector<int32_t> actions;
@@ -47,7 +48,7 @@ inline std::vector<int32_t> mixed_actions(int num_slots, uint32_t step) {
   return actions;
 }
 
-/// Returns actions that drive at 3 to 8 m/s without steering. The state is on the host.
+/// Returns actions that drive at 3 to 8 m/s without steering. The state must be on the host.
 inline std::vector<int32_t> straight_actions(const AgentStateView& state, int num_slots) {
   constexpr int32_t kStraight = 1, kBrake = kNumLatActions, kHold = 2 * kNumLatActions, kFaster = 3 * kNumLatActions;
   std::vector<int32_t> actions;
@@ -59,8 +60,8 @@ inline std::vector<int32_t> straight_actions(const AgentStateView& state, int nu
   return actions;
 }
 
-/// Returns mixed_actions() as commands. Some commands put agents a little farther along, to the side or onto another,
-/// or remove them. The state is on the host.
+/// Returns mixed_actions() as commands. Some commands instead move an agent a little forward and sideways or onto
+/// another agent, or remove it. The state must be on the host.
 inline std::vector<Command> mixed_commands(const AgentStateView& state, int num_slots, uint32_t step) {
   const std::vector<int32_t> actions = mixed_actions(num_slots, step);
   std::vector<Command> commands(actions.size());

@@ -1,5 +1,5 @@
-// Worlds that leave their simulator. Divided among several simulators, they together step and save as one simulator of
-// all worlds; single worlds go on in other simulators.
+// Worlds that move between simulators. Worlds that are divided among several simulators step and save as in one
+// simulator of all worlds. Single worlds continue in other simulators.
 #include "pictura/simulator/saved_worlds.h"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// Simulator::set_state of chosen agents and reset of chosen worlds.
+// Simulator::set_state() for chosen agents, and reset of chosen worlds.
 #include <cmath>
 
 #include <fmt/format.h>

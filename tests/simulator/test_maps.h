@@ -1,4 +1,4 @@
-// Small road maps made by hand, whose every number a test can compute, and the population for these maps.
+// Small hand-made road maps, all of whose numbers a test can compute, and options for the agents on these maps.
 #pragma once
 
 #include <memory>
@@ -8,26 +8,26 @@
 
 namespace pictura::testing {
 
-/// Returns `config` with vehicles alone: no pedestrians, cyclists or parked cars, for which these maps have no places.
+/// Returns `config` with vehicles only. These maps have no places for pedestrians, cyclists or parked cars.
 SimulatorConfig cars(SimulatorConfig config = {});
 
-/// Makes a circular one-way road of `radius_m` around the origin, driven counter-clockwise. One lane of 4 m is cut into
-/// four lanes of a quarter each, with road edges on both sides.
+/// Makes a circular one-way road of radius radius_m around the origin, with traffic counter-clockwise. It has four
+/// lanes, one after the other, each a quarter circle of 4 m width, and road edges on both sides.
 std::shared_ptr<RoadMap> ring_road(float radius_m);
 
-/// Makes a stadium-shaped one-way road: two straights of `straight_m` along x, at y = 0 (eastwards) and y = 40
-/// (westwards), joined by half circles. It has `num_lanes` lanes of 4 m with neighbours; lane 0 is outermost (right).
+/// Makes a stadium-shaped one-way road: two straights of length straight_m along x, at y = 0 (eastwards) and y = 40
+/// (westwards), joined by half circles. It has num_lanes neighbouring lanes of 4 m width; lane 0 is outermost (right).
 /// Lane i of the southern straight is at y = 4 i.
 std::shared_ptr<RoadMap> stadium(float straight_m, int num_lanes);
 
-/// Adds a light whose stop line crosses all southern lanes of a stadium at x_m, held by `junction` and phase 0 of
-/// num_phases.
+/// Adds a light that controls held_lanes, in phase 0 of a junction's num_phases. Its stop line crosses the southern
+/// lanes of a stadium at x_m; the lanes are width_m wide together.
 void add_light(RoadMap* map, float x_m, float width_m, int num_phases, std::vector<int32_t> held_lanes);
 
-/// Adds a lane of `type` along `points` that no link leads to; returns its index.
+/// Adds a lane of `type` along `points`, to which no link leads. Returns its index.
 int32_t add_side_lane(RoadMap* map, LaneType type, const std::vector<Vec3>& points);
 
-/// Adds a crosswalk with corners `corners`.
+/// Adds a crosswalk with these corners.
 void add_crosswalk(RoadMap* map, const std::vector<Vec3>& corners);
 
 }  // namespace pictura::testing

@@ -1,4 +1,4 @@
-// Counter of a thread's allocations. Linking allocations.cpp replaces a binary's operator new.
+// Counter of a thread's allocations. A program that links allocations.cpp gets its operator new.
 #pragma once
 
 namespace pictura::test {

@@ -1,4 +1,4 @@
-// Error messages for tests that check them.
+// Access to error messages, for tests that check them.
 #pragma once
 
 #include <string>

@@ -11,7 +11,8 @@
 
 namespace pictura {
 
-/// Returns why a renderer cannot run here, or an empty string. The test fails if PICTURA_REQUIRE_GL names the renderer.
+/// Returns why a renderer cannot run on this machine; empty if it can. If it cannot and PICTURA_REQUIRE_GL names the
+/// renderer, the test fails.
 inline std::string missing(const std::string& backend) {
   try {
     make_renderer(backend, {});

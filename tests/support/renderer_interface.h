@@ -1,4 +1,5 @@
-// Guarantees of all renderers for callers in host memory. Tests of the backends call these functions.
+// Checks of the guarantees that all renderers give to callers with host memory. Tests of the backends call these
+// functions.
 #pragma once
 
 #include <algorithm>
@@ -19,10 +20,10 @@
 
 namespace pictura::test {
 
-/// Makes renderers of one kind with a rig.
+/// Function that makes a renderer of one kind with the given rig.
 using MakeForRig = std::function<std::unique_ptr<Renderer>(const Rig& rig)>;
 
-/// Returns the bytes of a town's images, with its map in the handle that its world names.
+/// Returns the bytes of a town's images. The town's map must be uploaded to the handle that the scene's world names.
 inline std::vector<uint8_t> draw_town(Renderer* renderer, const SceneOwner& scene, const std::vector<View>& views) {
   HostImages images(renderer->config().rig, static_cast<int>(views.size()));
   std::ranges::fill(images.bytes(), uint8_t{0xA5});
@@ -31,8 +32,8 @@ inline std::vector<uint8_t> draw_town(Renderer* renderer, const SceneOwner& scen
   return {images.bytes().begin(), images.bytes().end()};
 }
 
-/// Expects that callers choose handles, that maps under them are replaced and released, and that renderers share a
-/// scene.
+/// Expects that callers can choose handles, that maps can be replaced and released by handle, and that renderers can
+/// share a scene.
 inline void expect_maps_by_handle(const MakeForRig& make) {
   const Rig rig = front_rig(32, 18);
   Snapshot town = make_synthetic_town(1, 20);
@@ -50,7 +51,7 @@ inline void expect_maps_by_handle(const MakeForRig& make) {
   const std::vector<uint8_t> expected_other = draw_town(only_other.get(), named(3), town.views);
   ASSERT_NE(expected, expected_other);
 
-  // Handles far apart, in any order.
+  // Uploads to handles that are far apart, in descending order.
   constexpr GeometryHandle kLast = kNumGeometryHandles - 1;
   second->upload(kLast, other.geometry);
   second->upload(7, town.geometry);
@@ -60,11 +61,11 @@ inline void expect_maps_by_handle(const MakeForRig& make) {
   first->upload(7, town.geometry);
   const SceneOwner shared = named(7);
   EXPECT_EQ(draw_town(first.get(), shared, town.views), draw_town(second.get(), shared, town.views));
-  // A replaced map.
+  // Replaces a map.
   second->upload(7, other.geometry);
   EXPECT_EQ(draw_town(second.get(), shared, town.views), expected_other);
   EXPECT_EQ(draw_town(first.get(), shared, town.views), expected);
-  // A released map; other maps are unchanged.
+  // Releases a map, twice. Other maps are unchanged.
   second->release(7);
   second->release(7);
   for (const GeometryHandle empty : {7, 8, kNumGeometryHandles, -1}) {
@@ -77,7 +78,7 @@ inline void expect_maps_by_handle(const MakeForRig& make) {
   EXPECT_EQ(draw_town(second.get(), shared, town.views), expected);
 }
 
-/// Expects that an error names each handle that no map can have.
+/// Expects an error that names the handle for each handle out of range.
 inline void expect_refused_handles(const MakeForRig& make) {
   const auto renderer = make(front_rig(8, 8));
   const StaticGeometry geometry = make_synthetic_town(1, 1).geometry;
@@ -88,7 +89,7 @@ inline void expect_refused_handles(const MakeForRig& make) {
   }
 }
 
-/// Returns the bytes of planar images in the patches of another layout, black beyond the images.
+/// Converts planar images to the patches of `layout`, and returns the bytes. Patches are black beyond the images.
 inline std::vector<uint8_t> as_patches(const HostImages& planar, const ImageLayout& layout) {
   const std::size_t size = bytes_per_value(layout.format);
   std::vector<uint8_t> result(layout.bytes());
@@ -112,10 +113,10 @@ inline std::vector<uint8_t> as_patches(const HostImages& planar, const ImageLayo
   return result;
 }
 
-/// Expects images in patches of any size, and bytes as bfloat16s, to hold the planar values, and black beyond the
-/// image.
+/// Expects that images in patches of any size contain the values of planar images, and black beyond the image. Also
+/// expects that bf16 images contain the values of u8 images.
 inline void expect_patches(const MakeForRig& make) {
-  Rig rig = paper_rig(33, 19);  // neither side is a multiple of a patch's
+  Rig rig = paper_rig(33, 19);  // neither side is a multiple of a patch's side
   rig.cameras[1] = paper_rig(32, 18).cameras[1];
   rig.cameras[2] = paper_rig(6, 24).cameras[2];
   Snapshot town = make_synthetic_town(2, 40);
@@ -147,7 +148,8 @@ inline void expect_patches(const MakeForRig& make) {
   }
 }
 
-/// Expects renderers to draw planar images and some patches, and to name the others in an error.
+/// Expects an error that names the order, the patch size or the format, for each request that the renderer does not
+/// support.
 inline void expect_refused_order(const MakeForRig& make) {
   const Rig rig = front_rig(8, 8);
   HostImages images(rig, 1);
@@ -172,8 +174,8 @@ inline void expect_refused_order(const MakeForRig& make) {
               testing::HasSubstr("images: expected the format u8 or f32, got bf16"));
 }
 
-/// Expects that drawing a compacted list with its count equals drawing exactly those views. Images of other views are
-/// not written, and views beyond the count are not read.
+/// Expects that drawing the first `count` views of a list gives the images of exactly those views. Images of later
+/// views must not be written, and later views must not be read.
 inline void expect_counted_views(const MakeForRig& make) {
   const Rig rig = paper_rig(24, 14);
   Snapshot town = make_synthetic_town(1, 20);
@@ -206,7 +208,7 @@ inline void expect_counted_views(const MakeForRig& make) {
   }
 }
 
-/// Expects queries to obey the count too; the answer for a view beyond the count is NaN.
+/// Expects that visibility queries also respect the number of views: the answer for a later view is NaN.
 inline void expect_counted_queries(const MakeForRig& make) {
   Snapshot town = make_synthetic_town(1, 20);
   town.views.resize(2);

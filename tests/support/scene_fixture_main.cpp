@@ -1,6 +1,6 @@
-// Commands for tests outside this program:
+// Program with commands for tests in other languages:
 //   scene_fixture write FOLDER    writes the fixture in every format, and its WOMD record as protobuf's JSON
-//   scene_fixture compare A B     prints where two scenes differ; exits with 1 if they do
+//   scene_fixture compare A B     prints where two scenes differ; exits with 1 if they differ
 //   scene_fixture many FILE N     writes a shard of N scenes as large as WOMD's
 #include <cstdio>
 #include <cstdlib>

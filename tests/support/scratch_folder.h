@@ -1,4 +1,4 @@
-// A folder for the files of one test, and environment variables set by a test.
+// A temporary folder for the files of one test, and environment variables that a test sets.
 #pragma once
 
 #include <cstdlib>
@@ -12,7 +12,8 @@
 
 namespace pictura::test {
 
-/// A new, empty folder named by test and process (ctest runs tests in parallel), removed with its contents.
+/// A new, empty folder, which the destructor removes with its contents. Its name contains the test and the process,
+/// because ctest runs tests in parallel.
 class ScratchFolder {
  public:
   ScratchFolder() {
@@ -43,7 +44,7 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-/// Sets or unsets an environment variable until the end of its scope.
+/// Sets or unsets an environment variable until the end of the scope.
 class EnvironmentVariable {
  public:
   EnvironmentVariable(const char* name, const std::optional<std::string>& value) : name_(name) {

@@ -1,4 +1,4 @@
-// Runs with an average of their weights, on any device, against an average computed by hand.
+// Checks that compare training runs that average their weights with an average computed by hand, on any device.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +18,9 @@ inline bool are_equal(const std::vector<NamedTensor>& a, const std::vector<Named
   });
 }
 
-/// Checks that a run of four updates into folder/with averages the weights after each update and learns the same as a
-/// run without an average, into folder/without. Both must be reproducible. Returns the reports of both.
+/// Makes two runs of four updates: one with an average, in folder/with, and one without, in folder/without. Checks that
+/// the first averages the weights after each update, and that both learn the same policy. Both runs must be
+/// reproducible. Returns their reports.
 inline std::array<TrainReport, 2> check_average_by_hand(const std::string& folder, const std::string& device) {
   const std::vector<std::string> reproducible{"train.reproducible=true", "train.checkpoint_every=1",
                                               "train.keep_checkpoints=9"};
@@ -54,7 +55,7 @@ inline std::array<TrainReport, 2> check_average_by_hand(const std::string& folde
   return {without, with};
 }
 
-/// Checks that a resumed run has the same average as an uninterrupted run. Both must be reproducible.
+/// Checks that a resumed run has the same average as an uninterrupted run. Both runs must be reproducible.
 inline void check_average_resumes_exactly(const std::string& folder, const std::string& device) {
   const auto run = [&](const std::string& name, int updates, OldRun old_run) {
     TrainOptions o =

@@ -1,4 +1,5 @@
-// Files: checkpoints that are read back completely or rejected by name, safetensors, TensorBoard records.
+// Files of runs: checkpoints, which are read completely or rejected with an error that names the file; safetensors;
+// TensorBoard records.
 #include "pictura/training/checkpoint.h"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// A task for PPO that a tiny vector policy learns in a second or two.
+// A task for PPO that a tiny vector policy learns in one or two seconds.
 #pragma once
 
 #include "pictura/backends/make_learner.h"
@@ -9,8 +9,9 @@
 
 namespace pictura::test {
 
-// Task without a simulator. The agent sees a sign s in its ego vector; "go" pays nothing immediately but makes the next
-// step's right action pay: credit has to travel over one step.
+// Task without a simulator. The agent observes a sign (1 or -1) in its ego vector. The action kGo has no immediate
+// reward, but in the next step, the right action for the sign is rewarded. So the policy must assign credit over one
+// step.
 struct Corridor {
   static constexpr int64_t kSlots = 128, kSteps = 8;
   static constexpr int kGo = 7;
@@ -19,7 +20,7 @@ struct Corridor {
   at::Tensor open = at::zeros({kSlots}, at::kFloat), sign = at::ones({kSlots}, at::kFloat);
 
   const std::unique_ptr<LearnerExecutor> executor = make_learner_executor(Device{});
-  const uint64_t seed;  // seed of the draws of actions and signs, and of the order of transitions
+  const uint64_t seed;  // seed of actions, signs and the order of transitions
 
   explicit Corridor(uint64_t its_seed = 9)
       : rollout(RolloutObservations(storage()), kSteps, kSlots, Device{}), seed(its_seed) {}
@@ -45,7 +46,7 @@ struct Corridor {
     return o;
   }
 
-  // Mean reward per step of one rollout.
+  // Plays one rollout, and returns the mean reward per step.
   double play(const Policy& policy, int64_t update) {
     for (int64_t t = 0; t <= kSteps; ++t) {
       const Observation row = row_of(rollout.observations.arrays(), t);

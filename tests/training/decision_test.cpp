@@ -1,5 +1,5 @@
-// Actions that are held for several steps: which agents decide when, the return of a decision, and that policies drive
-// as they were trained.
+// Actions that are held for several steps: the steps in which agents decide, the return of a decision, and driving as
+// in training.
 #include <cmath>
 #include <random>
 

@@ -1,5 +1,5 @@
-// Training on a CUDA device: it learns there in every precision, and agrees with the host where it should. Without a
-// device these tests are skipped, unless PICTURA_REQUIRE_GPU=1 requires one.
+// Training on a CUDA device: policies learn in every precision, and results that must equal those of the host do.
+// Without a device, the tests are skipped; if PICTURA_REQUIRE_GPU is 1, they fail instead.
 #include "pictura/tests/backend_cuda/device_test.h"
 
 #include <algorithm>

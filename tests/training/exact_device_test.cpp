@@ -1,6 +1,6 @@
-// On a CUDA device all of training except the network's arithmetic gives the host's bits, and CUDA graphs give the bits
-// of training without graphs, network included. Without a device these tests are skipped, unless PICTURA_REQUIRE_GPU=1
-// requires one.
+// On a CUDA device, all of training except the network's arithmetic gives the bits of the host. With CUDA graphs,
+// training, including the network, gives the bits of training without graphs. Without a device, the tests are skipped;
+// if PICTURA_REQUIRE_GPU is 1, they fail instead.
 #include <c10/core/CachingDeviceAllocator.h>
 
 #include "pictura/common/cuda/device_buffer.h"

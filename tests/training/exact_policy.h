@@ -1,5 +1,5 @@
-// Policy without matrix products, whose arithmetic is exact on every device, so that the parts of training around the
-// network can be compared bit for bit. Runs of three updates with it, and their records.
+// A policy without matrix products, whose arithmetic is exact on every device. With it, the other parts of training can
+// be compared bit for bit. Also runs of three updates with this policy, and their records.
 #pragma once
 
 #include <ATen/ATen.h>
@@ -13,9 +13,9 @@
 
 namespace pictura::test {
 
-/// Reads every bit of the policy's arrays and of the images, as a sum of integers, which has no order. The sum selects
-/// which 1, 2, 4 or 8 actions are possible, with equal probability, and the value. Agents of some kinds of conditioning
-/// drive straight ahead instead, so that they make progress.
+/// Reads every bit of the observed arrays and images. It sums them as integers, so that the sum does not depend on the
+/// order. The sum selects the value, and the 1, 2, 4 or 8 actions that are possible with equal probability. Agents with
+/// some conditioning values instead always drive straight ahead, so that they make progress.
 class ExactPolicy final : public Policy {
  public:
   explicit ExactPolicy(Device device) {
@@ -52,18 +52,18 @@ class ExactPolicy final : public Policy {
     const at::NoGradGuard no_grad;
     parameters_[0].value += 0.25;
   }
-  /// Returns the rows learnt from since the last call: the sum of each row, by calls of forward().
+  /// Returns a hash of each row that the policy has learnt from since the last call, grouped by calls of forward().
   std::vector<at::Tensor> take_learnt() { return std::exchange(learnt_, {}); }
 
  private:
-  static constexpr int64_t kStraightOn = (kNumLongActions - 1) * kNumLatActions + 1;  // forward jerk only, the largest
+  static constexpr int64_t kStraightOn = (kNumLongActions - 1) * kNumLatActions + 1;  // largest jerk, no steering
 
   static at::Tensor weighted(const at::Tensor& numbers) {
     const at::Tensor weights = at::arange(1, 2 * numbers.size(1), 2, numbers.options()) * 0x2545f4914f6cdd1d;
     return (numbers * weights).sum(1);
   }
   static at::Tensor bits_of(const at::Tensor& floats) { return weighted(floats.view(at::kInt).to(at::kLong)); }
-  // The rounds of SplitMix64's finalizer, with shifts that keep the sign.
+  // The rounds of SplitMix64's finalizer, but with arithmetic right shifts.
   static at::Tensor mixed(at::Tensor x) {
     x = x.bitwise_xor(x.bitwise_right_shift(30)) * -4658895280553007687;
     x = x.bitwise_xor(x.bitwise_right_shift(27)) * -7723592293110705685;
@@ -76,13 +76,13 @@ class ExactPolicy final : public Policy {
   mutable std::vector<at::Tensor> learnt_;
 };
 
-/// Three updates, on the host.
+/// Records of three updates, in host memory.
 struct ExactRun {
   struct Update {
-    // Tensors of Rollout.
+    // Tensors of the Rollout.
     std::vector<NamedTensor> rollout;
     std::vector<at::Tensor> images;  // images of some active agents
-    std::vector<at::Tensor> learnt;  // see ExactPolicy
+    std::vector<at::Tensor> learnt;  // see ExactPolicy::take_learnt()
     double kept_fraction = 0, adv_threshold = 0;
   };
   std::vector<Update> updates;
@@ -91,7 +91,8 @@ struct ExactRun {
   int64_t graph_launches = 0;
 };
 
-/// Configuration with a seed that produces every event that exact_test.cpp requires. Minibatches are chunks.
+/// Returns a configuration with a seed that produces every event that exact_test.cpp requires. Minibatches have the
+/// size of chunks.
 inline Config exact_config(const std::string& device, const std::vector<std::string>& more) {
   std::vector<std::string> overrides{"run.device=" + device,
                                      device == "cpu" ? "render.backend=cpu" : "render.backend=auto",
@@ -159,7 +160,7 @@ inline ExactRun run_exactly(const Config& config) {
   return result;
 }
 
-/// Checks that two runs have the same observations, actions and results, bit for bit.
+/// Checks that the observations, actions and results of two runs are bitwise identical.
 inline void expect_same_driving(const ExactRun& a, const ExactRun& b) {
   ASSERT_EQ(a.updates.size(), b.updates.size());
   for (size_t u = 0; u < a.updates.size(); ++u) {

@@ -1,5 +1,5 @@
-// All of training except the network's arithmetic gives the same bits in two runs, on any number of threads, and
-// whether images are kept or drawn again. exact_device_test.cpp compares a device with this.
+// All of training except the network's arithmetic gives the same bits in two runs, with any number of threads, and
+// whether images are stored or drawn again. exact_device_test.cpp compares a CUDA device with these results.
 #include <map>
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A hundred updates in each precision: the policy learns, and precision matters less than the seed.
+// A hundred updates in each precision: the policy learns, and the precision changes the result less than the seed does.
 #include <algorithm>
 #include <array>
 #include <cmath>

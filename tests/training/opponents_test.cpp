@@ -1,5 +1,5 @@
-// Opponents: the agents that saved policies drive in a run's worlds, their actions there, and that nothing is learnt
-// from them.
+// Opponents, the agents that saved policies drive in a run's worlds: their choice, their actions, and that the policy
+// does not learn from them.
 #include "pictura/training/opponents.h"
 
 #include <array>

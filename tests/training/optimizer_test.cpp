@@ -1,4 +1,4 @@
-// Steps of AdamW and Muon against their definitions, and which parameters each of them steps.
+// Steps of AdamW and Muon compared with their definitions, and the parameters that each optimizer updates.
 #include "pictura/training/optimizer.h"
 
 #include <cmath>

@@ -1,4 +1,5 @@
-// The first convolution at larger images: weights by hand, the function before and after a step, and exported files.
+// Adaptation of the first convolution to larger images: weights compared with values computed by hand, the function
+// before and after a step, and exported files.
 #include "pictura/policy/patch_spread.h"
 
 #include <ATen/core/grad_mode.h>

@@ -1,4 +1,4 @@
-// PPO: advantages, filter, schedule, shuffles, and that it learns.
+// PPO: advantages, the advantage filter, the schedule, shuffles, and learning on a small task.
 #include "pictura/training/ppo.h"
 
 #include <algorithm>

@@ -1,5 +1,6 @@
-// Ranks: their launch, how they meet and lose each other, their joint computations, and that they learn the same as a
-// single rank. Ranks are threads here; tests/apps/ranks_command_test.py has them as processes.
+// Ranks, the processes of a distributed run: their launch, connection and loss, their collective operations, and that
+// they learn the policy that a single rank learns. In these tests, ranks are threads; in
+// tests/apps/ranks_command_test.py, they are processes.
 #include "pictura/training/ranks/ranks.h"
 
 #include <cstdlib>

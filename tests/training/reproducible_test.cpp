@@ -1,4 +1,4 @@
-// One seed gives one policy: in two runs, in a resumed run, and in every setting that promises it.
+// One seed gives one policy: in two runs, in a resumed run, and with every setting for which this is guaranteed.
 #include <cstdlib>
 
 #include <ATen/Context.h>

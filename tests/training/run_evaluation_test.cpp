@@ -1,4 +1,4 @@
-// Work of a run besides learning: small evaluations, and changes of the image size.
+// Parts of a training run other than learning: small evaluations, and changes of the image size.
 #include <algorithm>
 #include <filesystem>
 

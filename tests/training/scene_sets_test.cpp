@@ -1,4 +1,5 @@
-// Training in recorded scenes: its roles, starts and goals are those of evaluations, and scenes take turns.
+// Training in recorded scenes: the roles, starts and goals of agents are those of evaluations, and all scenes are used
+// in turn.
 #include "pictura/training/scene_sets.h"
 
 #include <filesystem>

@@ -1,4 +1,5 @@
-// Teacher to imitate: its loss, its requirements for a run, and that a policy learns to act like it.
+// A teacher, which is a policy to imitate: its loss, its requirements for a run, and that a policy learns to act like
+// it.
 #include "pictura/training/teacher.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Training end to end on a few vehicles of the procedural town: files, exact resume, interrupts, evaluation.
+// Whole training runs with a few vehicles on the procedural town: files, exact resumption, interrupts and evaluation.
 #include <algorithm>
 #include <cmath>
 #include <csignal>

@@ -1,4 +1,5 @@
-// The average of weights: by hand, over a run, in its files and evaluations, and after resuming.
+// The average of weights: compared with values computed by hand, over a run, in its files and evaluations, and after
+// resuming.
 #include "pictura/training/weight_average.h"
 
 #include <cmath>

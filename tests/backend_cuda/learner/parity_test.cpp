@@ -1,5 +1,6 @@
-// The learner's work other than its network, on a device: bits equal to the host's, for the rules over rollouts and for
-// the scenes that a rollout records. Without a device these tests are skipped, or fail with PICTURA_REQUIRE_GPU=1.
+// The learner's work other than its network, on a CUDA device: the rules over rollouts and the scenes that a rollout
+// records give the bits of the host. Without a device, the tests are skipped; if PICTURA_REQUIRE_GPU is 1, they fail
+// instead.
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-// Device arithmetic that the compiler does not guarantee.
+// Device arithmetic whose rounding the compiler does not guarantee.
 #include "pictura/common/cuda/check.h"
 #include "pictura/common/cuda/device_buffer.h"
 #include "pictura/tests/backend_cuda/device_test.h"

@@ -1,12 +1,13 @@
-// Device instructions of common/portable/hd.h, compared with the device's own IEEE arithmetic.
+// Comparison of the device code in common/portable/intrinsics.h with the device's IEEE arithmetic.
 #pragma once
 
 #include <cuda_runtime_api.h>
 
 namespace pictura::test {
 
-/// Adds to *inverses and *roots (device memory) the number of values that reciprocal_in_range (of both signs) and
-/// sqrt_in_range do not round to nearest. Values have all mantissas and exponents -100 to 99.
+/// Counts the values for which reciprocal_in_range() or sqrt_in_range() does not round to nearest. Adds the counts to
+/// *inverses and *roots in device memory. The values have all mantissas and exponents -100 to 99; for reciprocals, they
+/// have both signs.
 cudaError_t count_unlike_ieee(unsigned long long* inverses, unsigned long long* roots);
 
 }  // namespace pictura::test

@@ -1,7 +1,8 @@
-// Emulates a device on the host, to run the source of kernels without a GPU. It provides the parts of CUDA that kernels
-// use, and blocks whose threads are fibers. Threads of a warp, and warps, run in a random order given by a seed. Each
-// runs up to the next collective operation. Lanes of a warp that wait for different operations are an error. Races
-// between two collective operations are not detected. Include before the kernels, in one source file.
+// Emulates a CUDA device on the host, to run the source of kernels without a GPU. It provides the parts of CUDA that
+// kernels use, and blocks whose threads are fibers. Warps, and the threads of a warp, run in a random order given by a
+// seed. Each thread runs up to its next collective operation. If lanes of a warp wait for different operations, that is
+// an error. Races between two collective operations are not detected. Only one source file may include this header,
+// before the kernels.
 #pragma once
 
 #include <algorithm>
@@ -33,7 +34,7 @@ class Block {
   enum class Step { none, warp, block, done };
   static constexpr int kLanes = 32;
 
-  /// Calls kernel() in each of `threads` threads, a multiple of the warp size.
+  /// Calls kernel() in each of `threads` threads. The number must be a multiple of the warp size.
   static void run(int threads, uint64_t seed, const std::function<void()>& kernel) {
     Block block(threads, seed, kernel);
     current() = &block;
@@ -131,7 +132,7 @@ class Block {
       for (const std::size_t warp : order) {
         const Step step = threads_[warp * kLanes].waits_for;
         if (step != Step::warp && !(step == Step::block && at_barrier)) continue;
-        // Run a random number of steps, so that some warps run far ahead.
+        // Runs a random number of steps, so that some warps run far ahead.
         for (int steps = 1 << (random_() % 8); steps > 0; --steps) {
           run_warp(warp);
           moved = true;

@@ -9,8 +9,8 @@
 
 namespace pictura::test {
 
-/// Draws with the emulated kernels. Each launch has two blocks, so that each block draws several images. The order of
-/// threads is random, given by a seed.
+/// Draws with the emulated kernels. Each launch has only two blocks, so that each block draws several images. The order
+/// of threads is random and depends on a seed.
 class EmulatedRenderer final : public Renderer {
  public:
   /// Capacity of the pool per image.
@@ -32,8 +32,8 @@ class EmulatedRenderer final : public Renderer {
   void poll() override;
   void check(Stream stream = {}) override;
 
-  /// Numbers of images of the last call that were left to the last launch (overflow), and that did not fit into the
-  /// pool (deferred).
+  /// Numbers of images of the last call: images that were left to the last launch (overflow), and images that did not
+  /// fit into the pool (deferred).
   int overflow() const { return overflow_; }
   int deferred() const { return deferred_; }
 
@@ -48,7 +48,7 @@ class EmulatedRenderer final : public Renderer {
   uint64_t seed_;
   Pool pool_;
   std::vector<PinholeCamera> cameras_;
-  std::vector<std::unique_ptr<Map>> maps_;        // [handle], null where it holds none
+  std::vector<std::unique_ptr<Map>> maps_;        // [handle]; null for a handle without a map
   std::vector<cuda::DeviceGeometry> geometries_;  // [handle]
   cuda::FaultWord fault_ = cuda::kNoFault;
   int overflow_ = 0, deferred_ = 0;

@@ -1,5 +1,5 @@
-// Drawing kernels, run thread by thread on the host, compared with the oracle: all values are equal, for any order of
-// threads. So broken kernels are found without a GPU.
+// Drawing kernels, run thread by thread on the host, compared with the oracle (the CPU renderer): all values are equal,
+// for any order of threads. So these tests find broken kernels without a GPU.
 #include <algorithm>
 #include <functional>
 #include <limits>

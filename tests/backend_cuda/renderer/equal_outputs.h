@@ -1,6 +1,6 @@
-// The kernels follow the oracle's rules in the oracle's arithmetic, and their sums are in whole units. So tests require
-// the oracle's exact bits, rather than the tolerance of other backends. Images equal to the oracle's are also equal to
-// each other, in any order of threads.
+// Comparison of kernels with the oracle (the CPU renderer). Kernels follow the rules and the arithmetic of the oracle,
+// and they sum integers. So tests require exactly the oracle's bits, and not only the tolerance of other backends. It
+// follows that images do not depend on the order of threads.
 #pragma once
 
 #include <cmath>
@@ -19,7 +19,8 @@ inline void expect_equal(const Outputs& actual, const Outputs& oracle) {
   EXPECT_TRUE(actual == oracle) << "colours or planes differ";
 }
 
-/// Queries the visibility of each agent of a world in all views; NaN is a valid answer.
+/// Compares the visibility of each agent of a world in all views. If the oracle's answer is NaN, `actual` must answer
+/// NaN.
 inline void expect_equal_visibility(Renderer* actual, Renderer* oracle, const Snapshot& town) {
   std::vector<VisibilityQuery> queries;
   for (std::size_t view = 0; view < town.views.size(); ++view) {

@@ -1,5 +1,5 @@
-// Kernels built at run time, on machines without a GPU: the code that a device would load, for every named
-// architecture, and its cache on disk.
+// Kernels that are built at run time, tested on machines without a GPU: the code that a device would load, for every
+// named architecture, and the cache of this code on disk.
 #include "pictura/backend_cuda/renderer/kernel_build.h"
 
 #include <filesystem>

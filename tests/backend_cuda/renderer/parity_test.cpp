@@ -1,5 +1,5 @@
-// The CUDA renderer compared with the oracle, on a device. Without a device these tests are skipped, or fail with
-// PICTURA_REQUIRE_GPU=1.
+// The CUDA renderer compared with the oracle (the CPU renderer), on a device. Without a device, the tests are skipped;
+// if PICTURA_REQUIRE_GPU is 1, they fail instead.
 #include <algorithm>
 
 #include <gmock/gmock.h>

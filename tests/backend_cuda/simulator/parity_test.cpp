@@ -1,5 +1,5 @@
-// The CUDA simulator compared with the CPU's, on a device: the same bits. Without a device these tests are skipped, or
-// fail with PICTURA_REQUIRE_GPU=1.
+// The CUDA simulator, on a device, gives the bits of the CPU simulator. Without a device, the tests are skipped; if
+// PICTURA_REQUIRE_GPU is 1, they fail instead.
 #include <algorithm>
 
 #include <gmock/gmock.h>

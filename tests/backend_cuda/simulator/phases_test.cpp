@@ -1,4 +1,4 @@
-// The CUDA executor's phases, run on the host in random orders, compared with the CPU executor: the same bits.
+// The CUDA simulator's phases, run on the host in random orders, give the bits of the CPU simulator.
 #include <cstring>
 
 #include <gmock/gmock.h>

@@ -1,6 +1,6 @@
-// The CUDA executor's phases on a host. Every loop over threads runs in a random order, because results must not depend
-// on an order that the device is free to choose. Two threads in the middle of one phase, and warps of many lanes, are
-// not tested.
+// Runs the phases of the CUDA simulator on the host. Every loop over threads runs in a random order, because a device
+// may choose any order and results must not depend on it. Threads that interleave within one phase, and warps of more
+// than one lane, are not tested.
 #pragma once
 
 #include <algorithm>
@@ -98,7 +98,7 @@ struct ShuffledLaunch {
   }
 };
 
-/// Steps worlds by the phases, from episode 0.
+/// Steps worlds with the phases of the CUDA simulator, from episode 0.
 class ShuffledExecutor {
  public:
   ShuffledExecutor(const SimulatorConfig& config, const std::vector<std::shared_ptr<const RoadMap>>& maps,

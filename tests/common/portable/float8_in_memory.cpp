@@ -1,4 +1,4 @@
-// Compiled without AVX.
+// Results of Float8 in memory: this file is compiled without AVX.
 #include "pictura/tests/common/portable/float8_results.h"
 
 namespace pictura {

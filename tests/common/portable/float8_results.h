@@ -1,4 +1,5 @@
-// Results of the operations on Float8, for the form of Float8 for which the including file is compiled.
+// Results of the operations on Float8. Float8 has two forms, in a register and in memory; the compiler options of the
+// including file select the form.
 #pragma once
 
 #include <cstring>
@@ -9,12 +10,12 @@
 namespace pictura {
 
 struct Float8Inputs {
-  float a[16], b[8];  // finite, not 0; a in the range of integers
+  float a[16], b[8];  // finite and not 0; `a` in the range of int32_t
   int32_t integers[8], indices[8];
   uint32_t mask;
 };
 
-/// Variant of results_of(), compiled for the form in memory.
+/// results_of(), compiled for the form in memory.
 std::vector<uint32_t> results_in_memory(const Float8Inputs& in);
 
 namespace {
@@ -61,7 +62,7 @@ std::vector<uint32_t> results_of(const Float8Inputs& in) {
   for (const Float8& of : of_indices) add(of);
   for (const Float8& of : of_fours) add(of);
 
-  // Elements behind the chosen ones are unspecified.
+  // Elements after the chosen elements are unspecified.
   int32_t stored[8], chosen[8], numbers[8];
   const int num_chosen = __builtin_popcount(in.mask);
   store8_integers(a, stored);

@@ -1,4 +1,4 @@
-// Comparison of the two forms of Float8: equal bit for bit.
+// The two forms of Float8, in a register and in memory, give bitwise identical results.
 #include <random>
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The shared coverage rules against brute force.
+// The coverage rules of common/raster compared with brute force.
 #include <algorithm>
 #include <random>
 

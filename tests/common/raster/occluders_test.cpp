@@ -1,5 +1,5 @@
-// Occluders: the faces that they occlude, the walls of a scene that are chosen, and equality of towns drawn with and
-// without occlusion culling.
+// Occluders: the faces that they occlude, the walls of a scene that are chosen as occluders, and equal images of towns
+// with and without occlusion culling.
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,4 @@
-// The rule of randomized cameras: the draws, their keys, and the mounting of a camera by them.
+// Randomized cameras: the random numbers, their keys, and the mounting of a camera that follows from them.
 #include "pictura/common/raster/randomize_camera.h"
 
 #include <cmath>

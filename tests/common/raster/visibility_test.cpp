@@ -1,5 +1,5 @@
-// The shared visibility rules against brute force: the front face of two, and the visible samples of a pixel's
-// fragments.
+// The visibility rules of common/raster compared with brute force: which of two faces is in front, and the visible
+// samples of a pixel's fragments.
 #include <algorithm>
 #include <bit>
 #include <random>

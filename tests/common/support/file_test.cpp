@@ -1,4 +1,4 @@
-// Files that are read whole; PNG and hash. output_file_test.cpp tests writing.
+// Reading of whole files, PNG files, and hashes. output_file_test.cpp tests writing.
 #include "pictura/common/support/file.h"
 
 #include <atomic>

@@ -1,4 +1,4 @@
-// Effects of filling a folder again on existing files.
+// Effects on existing files when a command fills a folder again.
 #include "pictura/common/support/filled_folder.h"
 
 #include <algorithm>

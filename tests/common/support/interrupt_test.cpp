@@ -1,4 +1,5 @@
-// Signals that end a process: recorded once, and not taken for a second request a moment later.
+// Signals that end a process: the first is recorded, and a second signal shortly afterwards does not count as a second
+// request.
 #include "pictura/common/support/interrupt.h"
 
 #include <csignal>

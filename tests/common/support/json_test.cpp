@@ -1,4 +1,4 @@
-// Nesting depth of JSON from outside.
+// Limit of the nesting depth of external JSON.
 #include "pictura/common/support/json.h"
 
 #include <gtest/gtest.h>

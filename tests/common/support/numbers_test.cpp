@@ -1,4 +1,4 @@
-// Numbers as people write them.
+// Parsing of numbers that users write.
 #include "pictura/common/support/numbers.h"
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// parallel_for visits every item once, rethrows the lowest item's exception, and uses as many threads as it needs,
-// which sleep when idle.
+// parallel_for() visits every item once, rethrows the exception of the lowest item, and uses only as many threads as it
+// needs. Idle threads sleep.
 #include "pictura/common/support/parallel_for.h"
 
 #include <atomic>

@@ -1,4 +1,4 @@
-// The known word nearest to a misspelt word.
+// Suggestion of the known word that is nearest to a misspelt word.
 #include "pictura/common/support/suggestion.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Controllers and the commands that they write: random and idle ones, kinematic states, absence.
+// Controllers and the commands that they write: the random and the idle controller, kinematic states, and absence.
 #include <cmath>
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
-// The lane-keeping controller, also in every town: keeping the lane and stopping at red lights cause no
-// infractions, and agents reach their goals.
+// The lane-keeping controller, also in every town: it keeps the lane and stops at red lights without infractions, and
+// agents reach their goals.
 #include "pictura/simulator/controllers/lane_keeping.h"
 
 #include <fmt/format.h>
