@@ -53,7 +53,7 @@ PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
 }
 
 /// State of a traffic light. `unknown` means that a recording has no state for the light. Unknown lights, and all
-/// lights of a world without light states, are not drawn. Saved files contain these numbers.
+/// lights of a world without light states, are not drawn. Saved files contain these numbers, so they must not change.
 enum class LightState : uint8_t { off, red, yellow, green, unknown };
 constexpr int kNumLightStates = 5;
 

@@ -55,7 +55,7 @@ struct ImageLayout {
   std::vector<BlockLayout> blocks;    // one per distinct size, without gaps, in order of first occurrence
   PixelFormat format = PixelFormat::u8;
   ChannelOrder order = ChannelOrder::planar;
-  int patch_px = kDefaultPatch_px;  // side of the patches, where the order is patches
+  int patch_px = kDefaultPatch_px;  // side of the patches if the order is patches
   int64_t num_views = 0, num_values = 0;
   std::size_t bytes() const { return static_cast<std::size_t>(num_values) * bytes_per_value(format); }
 };
@@ -91,7 +91,7 @@ struct ImageBatch {
   int num_views = 0;
   Span<const CameraImages> cameras;  // [cameras of the rig]
   ChannelOrder order = ChannelOrder::planar;
-  int patch_px = kDefaultPatch_px;  // side of the patches, where the order is patches
+  int patch_px = kDefaultPatch_px;  // side of the patches if the order is patches
 };
 
 enum class Planes : uint8_t { none, all };  // optional outputs of CameraImages: depth, class and instance

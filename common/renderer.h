@@ -37,7 +37,7 @@ struct RendererConfig {
   std::size_t max_scratch_bytes = std::size_t{512} << 20;
 };
 
-/// Base class of renderers. An object serves one thread at a time; distinct objects are independent.
+/// Base class of renderers. Only one thread at a time may use an object; distinct objects are independent.
 ///
 /// A renderer on a CUDA device makes that device current in each call and restores the caller's device. A call returns
 /// when its work is enqueued on the stream. All calls use the same memory of the renderer: issue them on one stream, or

@@ -64,7 +64,7 @@ struct RandomKey {
 
   uint64_t seed = 0;
   uint32_t world = 0;
-  uint32_t agent = 0;  // index in its world, below kMaxAgents; not a simulator's slot
+  uint32_t agent = 0;  // index in the world, below kMaxAgents; not a simulator's slot
   uint32_t episode = 0;
   uint32_t step = 0;
   Purpose purpose = Purpose::world_size;

@@ -46,7 +46,7 @@ struct SceneOwner {
 /// Makes a box that is drawn in the colours of its class. size_m is (length, width, height).
 AgentBox make_box(AgentClass agent_class, Vec3 center_m, float heading_rad, Vec3 size_m);
 
-/// Makes a view at a pose; it hides no agent.
+/// Makes a view at a pose. The view hides no agent.
 View make_view(Vec3 origin_m, float heading_rad);
 
 /// Views of one call to a renderer. If num_views is not null, it points to memory on the device of the views, and only

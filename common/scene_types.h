@@ -65,7 +65,7 @@ struct StaticGeometryView {
   int32_t num_signals = 0;
 };
 
-/// An agent's oriented box, standing upright on the ground.
+/// An agent's oriented box, which is upright.
 struct AgentBox {
   Vec3 center_m;  // centre of the box's bottom face
   float cos_heading = 1, sin_heading = 0;
@@ -129,7 +129,7 @@ struct View {
   static constexpr float kRigBodyLength_m = 4.5f;
 };
 
-/// Whether a cosine and a sine form a direction. Headings are computed in float, so a small drift is accepted.
+/// Whether a cosine and a sine form a unit vector. Small errors are accepted, because headings are computed in float.
 PICTURA_HD inline bool is_direction(float cosine, float sine) {
   return fabsf(cosine * cosine + sine * sine - 1.0f) < 1e-2f;
 }
@@ -143,7 +143,7 @@ PICTURA_HD inline bool has_valid_hidden_range(const View& view, size_t hidden_ag
          static_cast<size_t>(view.hidden_end) <= hidden_agents;
 }
 
-/// Query of the visible share of an agent in a view.
+/// Query of the visible share of an agent in a view, see Renderer::visibility().
 struct VisibilityQuery {
   int32_t view = 0;
   int32_t agent = 0;  // index into SceneBatch::agents

@@ -25,10 +25,10 @@ struct MapPictureOptions {
 };
 
 /// Draws a map from above: lanes by type, markings, road edges, crosswalks, parking spaces, building lines, signs,
-/// painted stop lines, and and lights. A light is drawn with its stop line, its phase, and the angle within which its
-/// head is visible. Adds a legend, the map's properties, coordinates of the map's file along two sides, and a scale
-/// bar. Throws Error if the size is out of range, if the box is not finite or a side is not between 1 m and 1000 km, or
-/// if the map has nothing to draw. Throws Interrupted at ^C.
+/// painted stop lines, and lights. A light is drawn with its stop line, its phase, and the angle within which its head
+/// is visible. Adds a legend, the map's properties, coordinates of the map's file along two sides, and a scale bar.
+/// Throws Error if the size is out of range, if the box is not finite or a side is not between 1 m and 1000 km, or if
+/// the map has nothing to draw. Throws Interrupted at ^C.
 RgbImage draw_map(const RoadMap& map, const MapPictureOptions& options = {});
 
 /// Writes draw_map() as a PNG file. Throws Error naming the path.

@@ -14,7 +14,8 @@
 
 namespace pictura {
 
-/// Number of device arrays that this process has allocated so far; constant across a loop that allocates nothing.
+/// Number of device arrays that this process has allocated so far. Tests compare it before and after a loop that must
+/// not allocate.
 inline std::atomic<int64_t> device_allocations{0};
 
 /// An array in device memory, initially undefined. Movable, not copyable.

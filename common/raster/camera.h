@@ -45,8 +45,8 @@ PICTURA_HD inline Vec3 to_camera(const PinholeCamera& camera, Vec3 world_m) {
   return {dot(camera.right, d), dot(camera.down, d), dot(camera.forward, d)};
 }
 
-/// View frustum: slopes x/depth and y/depth of its four sides (guard band included), factors that normalise distances
-/// to those sides, and slopes per pixel. Depends only on the projection.
+/// View frustum, which depends only on the projection. It holds the slopes x/depth and y/depth of the four sides
+/// (including the guard band), factors that normalise distances to the sides, and the slopes of one pixel.
 struct Frustum {
   float x_low = 0, x_high = 0, y_low = 0, y_high = 0;
   float x_low_scale = 0, x_high_scale = 0, y_low_scale = 0, y_high_scale = 0;
@@ -81,7 +81,7 @@ PICTURA_HD inline bool sphere_in_frustum(const Frustum& f, Vec3 center, float ra
   return in_range & in_width & in_height;
 }
 
-/// Corner 0 to 3 of the frustum at the visible range, in world coordinates.
+/// Position of corner 0 to 3 of the frustum at the visible range, in world coordinates.
 PICTURA_HD inline Vec3 far_corner(const PinholeCamera& camera, const Frustum& f, int corner) {
   const float x = (corner & 1) ? f.x_high : f.x_low;
   const float y = (corner & 2) ? f.y_high : f.y_low;

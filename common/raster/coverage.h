@@ -49,7 +49,7 @@ PICTURA_HD inline PixelCoverage rounded_coverage(float area, uint64_t samples) {
   return {min_of(area, 1.0f), samples};
 }
 
-/// Heights at which an edge's line crosses the left and right sides of a pixel, in pixels from its top.
+/// Heights at which an edge's line crosses the left and right sides of a pixel, in pixels from the pixel's top.
 struct EdgeCrossing {
   float left = 0, right = 0;
 };
@@ -78,7 +78,7 @@ PICTURA_HD inline Int16x8 column_heights(const PolygonEdge& edge) {
   return arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
 }
 
-/// Clips a range to the inner side of an edge.
+/// Clips the range of each column to the inner side of an edge.
 PICTURA_HD inline void narrow(const PolygonEdge& edge, const EdgeCrossing& crossing, SampleRange* range_inout) {
   constexpr uint32_t kLowest = 0, kHighest = 0x80008000u;
   const float at = saturate((crossing.left + crossing.right) * fabsf(edge.rows_scale) + edge.rows_offset);

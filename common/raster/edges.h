@@ -11,12 +11,12 @@ namespace pictura {
 /// faces that share an edge split areas and samples exactly.
 struct alignas(16) PolygonEdge {
   float x0 = 0, y0 = 0;  // the upper end
-  float half_dx_dy = 0;  // slope of its line; 0 for level edges
-  // Maps the line to sample heights, together with rows_offset and rows_step (see make_edge). Negative if the face is
-  // above the edge. row_span() reads only the members up to this member.
+  float half_dx_dy = 0;  // half of dx/dy of the line; 0 for level edges
+  // Together with rows_offset and rows_step, it maps the line to sample heights (see make_edge()). It is negative if
+  // the face is above the edge. row_span() reads only this member and the members before it.
   float rows_scale = 0;
   float y1 = 0;     // the lower end's y; equal to y0 for level edges, which bound no area
-  float dy_dx = 0;  // slope of its line; 0 for level edges
+  float dy_dx = 0;  // dy/dx of the line; 0 for level edges
   float rows_offset = 0;
   int32_t rows_step = 0;
 };

@@ -164,8 +164,8 @@ PICTURA_HD inline void wall_faces(const WallFace& wall, const PinholeCamera& cam
   emit_quad(wall_quad(wall), camera, 0.0f, emit);
 }
 
-/// Whether a light's state is known and its head is visible from position_m: from the front, and within its half-angle
-/// on the ground plane.
+/// Whether a light head is visible from position_m. The light's state must be known, and position_m must be in front of
+/// the head, within the head's half-angle on the ground plane.
 PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state, Vec3 position_m) {
   if (state == LightState::unknown) return false;
   const Vec2 to_eye = position_m.xy() - head.position_m.xy();

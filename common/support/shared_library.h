@@ -1,4 +1,4 @@
-// Libraries that are opened at run time, so that programs start where the libraries are missing.
+// Libraries that are opened at run time, so that programs also start on machines without these libraries.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// A library that stays open for the rest of the process: drivers do not survive being unloaded.
+/// A library that stays open for the rest of the process, because drivers cannot be unloaded safely.
 class SharedLibrary {
  public:
   /// Throws Error "renderer RENDERER: cannot open FILE (SOURCE): reason"; `source` tells users where to get the
