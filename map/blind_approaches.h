@@ -1,5 +1,5 @@
-// Frequency with which walls hide crossing traffic from drivers who approach a junction: a property of maps for studies
-// of occlusion.
+// Counts how often walls hide crossing traffic from a driver that approaches a junction. Studies of occlusion compare
+// maps by these counts.
 #pragma once
 
 #include <vector>
@@ -9,25 +9,25 @@
 
 namespace pictura {
 
-/// Counts of blind approaches. The eye is `distance_m` before a junction. A crossing vehicle is equally far before the
-/// junction on another road, and their paths cross inside the junction. The vehicle is hidden if walls block every line
-/// of sight from the eye to its box. Distances are measured along the lanes that lead to the junction.
+/// Counts of blind approaches of a map. A driver and another vehicle approach a junction on different roads, and their
+/// paths cross inside the junction. Both are at the same distance before the junction, measured along their lanes. The
+/// vehicle is hidden if walls block every tested line of sight from the driver's eye to the vehicle's box.
 struct BlindApproaches {
-  int32_t approaches = 0;  // lanes into a junction with a path that another path crosses
-  int32_t blind = 0;       // approaches with a hidden crossing vehicle
-  int32_t crossings = 0;   // ordered pairs of crossing paths from different roads
-  int32_t hidden = 0;      // crossings with a hidden crossing vehicle
+  int32_t approaches = 0;  // lanes that lead into a path that another path crosses
+  int32_t blind = 0;       // approaches on which any crossing vehicle is hidden
+  int32_t crossings = 0;   // ordered pairs (driver, vehicle) of crossing paths
+  int32_t hidden = 0;      // crossings whose vehicle is hidden
 };
 
-/// Counts blind approaches at `distance_m` before junctions. Paths whose lanes begin closer to the junction are
-/// skipped. The map must be validated.
+/// Counts blind approaches, with driver and vehicle `distance_m` before the junction. Skips a pair if the lanes before
+/// the junction are too short for this distance. The map must be validated.
 BlindApproaches count_blind_approaches(const RoadMap& map, Span<const WallFace> walls, float distance_m = 20.0f);
 
-/// A hidden pair: a lane into a junction, and a lane whose traffic is hidden from it by walls.
+/// Two lanes that lead into a junction. Walls hide traffic on `other_approach` from drivers on `approach`.
 struct BlindCrossing {
   int32_t approach = -1, other_approach = -1;
 };
-/// Returns each hidden pair of lanes once, in ascending order.
+/// Returns each such pair of lanes once, in ascending order of lane indices.
 std::vector<BlindCrossing> find_blind_crossings(const RoadMap& map, Span<const WallFace> walls,
                                                 float distance_m = 20.0f);
 

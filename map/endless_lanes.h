@@ -1,4 +1,4 @@
-// Lanes where an unbounded route starts, for any importer.
+// Finds the lanes on which an unbounded route starts, for all importers.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,10 @@ constexpr bool is_route(LaneType type) { return type == LaneType::driving || typ
 
 /// Groups of lanes that lane changes connect. A group's leftmost lane identifies it.
 struct LaneGroups {
-  std::vector<std::size_t> of_lane;               // [lanes] leftmost lane of the lane's group
-  std::vector<std::vector<std::size_t>> members;  // [lanes] members of the group with this leftmost lane; else empty
+  std::vector<std::size_t> of_lane;  // [lanes] leftmost lane of the lane's group
+  std::vector<std::vector<std::size_t>>
+      // [lanes] Members of the group whose leftmost lane is this lane; empty for other lanes.
+      members;
 };
 LaneGroups group_lanes(const RoadMap& map);
 

@@ -1,5 +1,5 @@
-// Serialization of structs listed by PICTURA_FIELDS (map_fields.h): every field in order, with strings and vectors
-// preceded by their 64-bit size. Shared by the caches of maps and of scenes.
+// Serialization of structs whose fields PICTURA_FIELDS (map_fields.h) lists. Fields are written in declaration order; a
+// 64-bit size precedes each string and vector. Shared by the caches of maps and of scenes.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,8 @@ constexpr bool kIsVector = false;
 template <typename T>
 constexpr bool kIsVector<std::vector<T>> = true;
 
-/// Whether a T's bytes in memory equal its bytes in the file and any bit pattern is valid: only numbers, no padding.
+/// Whether a T has the same bytes in memory as in the file and every bit pattern is valid. This is true for numbers,
+/// and for structs of numbers without padding.
 template <typename T>
 constexpr bool is_plain() {
   if constexpr (HasFields<T>) {
@@ -41,7 +42,7 @@ constexpr bool is_plain() {
   }
 }
 
-/// Minimum size of a T in the file.
+/// Minimum size of a T in the file, in bytes.
 template <typename T>
 constexpr uint64_t min_bytes() {
   if constexpr (HasFields<T>) {
@@ -55,8 +56,8 @@ constexpr uint64_t min_bytes() {
   }
 }
 
-/// Appends the layout of a T: the names of its fields and the sizes of its numbers. A file with its layout cannot be
-/// read as another type.
+/// Appends a text that describes the layout of a T: the names of its fields and the sizes of its numbers. A file that
+/// contains this text cannot be read as another type by mistake.
 template <typename T>
 void append_layout(std::string* text_out) {
   if constexpr (HasFields<T>) {

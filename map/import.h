@@ -1,4 +1,5 @@
-// What all importers of map files share: checked options, a budget, progress, and errors that name the file.
+// Functions that all importers of map files share: a check of options, a limit on samples, and errors that name the
+// file.
 #pragma once
 
 #include <cstddef>
@@ -12,33 +13,29 @@
 
 namespace pictura {
 
-/// One import: what the importer may ask for, and the map that it fills.
-class MapImport {
- public:
-  MapImport(std::size_t text_bytes, const std::string& source, const OpenDriveOptions& import_options,
-            const ImportProgress& progress);
+/// Throws Error if options.chord_error_m is outside [0.001, 10] m, or if options.plan mirrors or has a singular value
+/// outside [0.5, 1.5].
+void check_import_options(const OpenDriveOptions& options);
 
-  /// Reports the stage that begins, and the share of the work that is done. Throws Interrupted after a signal.
-  void begin(const char* stage, double done) const;
-  /// Bounds the import time of small files and the memory of large ones.
-  SampleBudget budget() const;
+/// Returns the limit on samples of curves for a file of `text_bytes` bytes. It bounds the import time of small files
+/// and the memory for large files. `source` is the file's name in messages.
+SampleBudget import_budget(std::size_t text_bytes, const std::string& source, const InterruptibleWork& work);
 
-  const OpenDriveOptions& options;
-  opendrive::Faults faults;
-  RoadMap map;
-
- private:
-  std::size_t text_bytes_;
-  const std::string& source_;
-  const ImportProgress& progress_;
-  InterruptibleWork work_;
-};
-
-/// Calls fill(import) and returns the validated map with its repairs. `source` is the file's name in messages, and is
-/// added to errors that do not name it, because they are about the file as a whole. Throws Error unless
-/// options.chord_error_m is in [0.001, 10] m, the singular values of options.plan are in [0.5, 1.5], and the plan does
-/// not mirror.
-RoadMap import_map(std::size_t text_bytes, const std::string& source, const OpenDriveOptions& options,
-                   const ImportProgress& progress, const std::function<void(MapImport* import)>& fill);
+/// Returns the RoadMap that import() returns. Adds the file's name, `source`, to the messages of errors that do not
+/// begin with it.
+template <typename Import>
+RoadMap import_named(const std::string& source, Import&& import) {
+  try {
+    return std::forward<Import>(import)();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const UsageError&) {
+    throw;
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    if (message.starts_with(source)) throw;
+    fail("{}: {}", source, message);
+  }
+}
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// The lanes of a map as a graph, for routes over several lanes: nodes are lanes; edges lead to successors and to the
+// Graph of a map's lanes, for routes over several lanes. Nodes are lanes. Edges lead to successors, and to the
 // neighbours that a lane change can reach.
 #pragma once
 
@@ -11,7 +11,7 @@
 
 namespace pictura {
 
-/// A position on a lane's centre line, s_m from its start.
+/// A position on a lane's centre line, `s_m` metres from the start of the lane.
 struct LanePosition {
   int32_t lane = -1;
   float s_m = 0;
@@ -19,7 +19,7 @@ struct LanePosition {
 
 struct LaneRoute {
   std::vector<int32_t> lanes;  // in driving order; a lane change appends the new lane
-  double length_m = 0;         // along the lanes
+  double length_m = 0;         // length along the lanes
   int32_t lane_changes = 0;
   double cost_m = 0;  // length_m plus the cost of the lane changes
 };
@@ -30,9 +30,9 @@ struct LaneComponents {
   std::vector<int32_t> of_lane;  // [lanes] in [0, count); edges never lead to a higher component
 };
 
-/// Lane graph with a copy of the map data that it needs. A lane change goes to a neighbour, at the same fraction of
-/// both lanes' lengths, and has a fixed cost in metres. Changes are made only where a route or a lane begins:
-/// neighbours begin and end together, so later changes reach nothing new.
+/// Lane graph, with its own copy of the map data that it needs. A lane change keeps the position as a fraction of the
+/// lane's length, and has a fixed cost in metres. A route changes lanes only at its start and at starts of lanes. Later
+/// changes would reach no other lanes, because neighbours begin and end together.
 class LaneGraph {
  public:
   /// Throws Error unless the cost is finite and not negative. The map must be validated.
@@ -41,18 +41,18 @@ class LaneGraph {
   int32_t num_lanes() const { return static_cast<int32_t>(length_m_.size()); }
   float length_m(int32_t lane) const { return length_m_[lane]; }
 
-  /// Returns the cheapest route, or nothing if there is none. A position behind `from` on the same lane is reached by a
+  /// Returns the cheapest route, or nothing if there is none. If `to` is behind `from` on the same lane, the route is a
   /// loop. Throws Error for a lane that is not in the map, or an s_m outside the lane.
   std::optional<LaneRoute> route(LanePosition from, LanePosition to) const;
 
-  /// Minimum cost from a position to the start of each lane, [lanes]; infinite where there is no route. Throws as
-  /// route() does.
+  /// Returns the minimum cost in metres from a position to the start of each lane, as [lanes]. The cost is infinite if
+  /// there is no route. Throws as route() does.
   std::vector<double> distances_from(LanePosition from) const;
 
-  /// Whether a route leads from the start of `lane` to the start of each lane, [lanes].
+  /// Returns for each lane, as [lanes], whether a route leads to its start from the start of `lane`.
   std::vector<bool> reachable_from(int32_t lane) const;
 
-  /// The strongly connected components (Tarjan, Depth-first search and linear graph algorithms, 1972).
+  /// Returns the strongly connected components (Tarjan, Depth-first search and linear graph algorithms, 1972).
   LaneComponents components() const;
 
  private:
@@ -60,8 +60,8 @@ class LaneGraph {
     int32_t lane = 0;
     bool is_change = false;
   };
-  /// Result of a search. Node n < lanes is the start of lane n. Node lanes + n is the position on lane n beside the
-  /// start position; only lane changes reach it.
+  /// Result of a search from a start position. Node n < num_lanes() is the start of lane n. Node num_lanes() + n is the
+  /// position on lane n beside the start position, which only lane changes reach.
   struct Search {
     double begin_fraction = 0;            // start position as a fraction of its lane's length
     std::vector<double> cost_m;           // [nodes] minimum costs

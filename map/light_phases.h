@@ -1,4 +1,4 @@
-// Phases of lights that no controller of the file controls.
+// Phases of traffic lights that no controller of the map's file controls. Lights of one phase are green together.
 #pragma once
 
 #include <algorithm>
@@ -9,8 +9,9 @@
 
 namespace pictura {
 
-/// The phase of an approach of a junction: that of the first approach whose heading, or its opposite, differs by at
-/// most 45 degrees, else a new one. `axes_inout` holds the heading of the first approach of each phase, in radians.
+/// Returns the phase of a junction's approach with this heading. It is the first phase whose axis differs from the
+/// heading, or from the opposite heading, by at most 45 degrees; else a new phase. `axes_inout` holds the axis of each
+/// phase: the heading, in radians, of its first approach.
 inline int32_t phase_of_heading(double heading_rad, std::vector<double>* axes_inout) {
   constexpr double kSameAxis_rad = 0.25 * std::numbers::pi;
   const auto same = std::find_if(axes_inout->begin(), axes_inout->end(), [&](double axis) {

@@ -1,4 +1,4 @@
-// Line-of-sight tests between an eye and a vehicle, past walls.
+// Tests whether walls hide a vehicle from an eye.
 #pragma once
 
 #include <optional>
@@ -8,7 +8,8 @@
 
 namespace pictura {
 
-/// Returns the fraction of a-b at which c-d crosses it, if they cross.
+/// Returns the position on segment a-b where segment c-d crosses it, as a fraction of a-b. Returns nothing if the
+/// segments do not cross.
 std::optional<float> crossing_fraction(Vec2 a, Vec2 b, Vec2 c, Vec2 d);
 
 /// Walls in a grid. The walls must outlive this object.
@@ -16,8 +17,8 @@ class LineOfSight {
  public:
   explicit LineOfSight(Span<const WallFace> walls);
 
-  /// Whether walls block the view of a box: of its corners, the middles of its sides and its centre, at half its
-  /// height.
+  /// Whether walls block the lines of sight to all nine tested points of a box: its corners, the middles of its sides
+  /// and its centre, all at half its height.
   bool is_hidden(Vec3 eye_m, const AgentBox& box) const;
 
  private:

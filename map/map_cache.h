@@ -1,5 +1,5 @@
-// Cache of imported maps: a RoadMap as a binary file. The header identifies the sources; stale or damaged files are
-// rejected.
+// Cache of imported maps. Each binary file holds one RoadMap, and a header that identifies the map's sources. Stale or
+// damaged files are rejected.
 #pragma once
 
 #include <cstdint>
@@ -22,19 +22,21 @@ struct MapCacheKey {
 /// Returns the key of a file with these bytes, for this build of the importer.
 MapCacheKey map_cache_key(std::string_view source_bytes, const OpenDriveOptions& options);
 
-/// Encodes a map: a header of magic, version, byte order, key, size and hash of the payload; then every field of
-/// RoadMap in the order of map_fields.h, with strings and vectors preceded by their 64-bit size.
+/// Encodes a map as a header and a payload. The header contains the file type's magic bytes, the version, the byte
+/// order, the key, and the size and hash of the payload. The payload contains every field of RoadMap in the order of
+/// map_fields.h. A 64-bit size precedes each string and vector.
 std::string encode_map(const RoadMap& map, const MapCacheKey& key);
 
-/// Decodes and validates a map. Throws Error "NAME: reason" when the bytes are foreign (magic), of another byte order
-/// or version, truncated, stale (another importer, file or options), or damaged (hash, sizes, values). For any bytes,
-/// memory is bounded by a few times their size.
+/// Decodes and validates a map. Throws Error "NAME: reason" if the bytes are of another file type, byte order or
+/// version, truncated, stale (another importer, file or options), or damaged (wrong hash, size or value). Uses memory
+/// of at most a few times the size of the bytes, even if they are damaged.
 RoadMap decode_map(std::string_view bytes, const MapCacheKey& key, const std::string& name);
 
 /// Returns the header that encode_map() puts before `payload`.
 std::string map_cache_header(std::string_view payload, const MapCacheKey& key);
 
-/// Returns the path of the cache file for `source_path` imported with these options. Empty when caching is off.
+/// Returns the path of the cache file for the map file `source_path` and these options. Returns an empty path if the
+/// cache is disabled.
 std::string map_cache_path(const std::string& source_path, const OpenDriveOptions& options);
 
 }  // namespace pictura

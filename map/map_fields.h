@@ -1,5 +1,5 @@
-// Field lists of RoadMap and of its elements, by which whole maps are written, read and compared. A structured binding
-// must name every field, so an incomplete list does not compile.
+// Lists of the fields of RoadMap and its elements. Whole maps are written, read and compared field by field with these
+// lists. An incomplete list does not compile, because a structured binding must name every field.
 #pragma once
 
 #include <string>
@@ -59,7 +59,7 @@ PICTURA_FIELDS(RoadMap, name, origin_m, geo_reference, road_names, lanes, lane_p
 PICTURA_FIELDS(PlanMap, xx, xy, yx, yy)
 PICTURA_FIELDS(OpenDriveOptions, chord_error_m, strict, plan)
 
-/// Calls visit(name, field) for each field of a listed struct, in declaration order.
+/// Calls visit(name, field) for each field of a struct that has a list, in declaration order.
 template <typename T, typename Visit>
 void visit_fields(const T& value, Visit&& visit) {
   std::size_t i = 0;
@@ -67,8 +67,8 @@ void visit_fields(const T& value, Visit&& visit) {
              fields_of(value));
 }
 
-/// Returns the first bitwise difference of two maps, as a path like "lanes[3].length_m" or "lights: 8 and 9 of them";
-/// empty if the maps are equal.
+/// Returns the first bitwise difference of two maps, such as "lanes[3].length_m: 4 and 5" or "lights: 8 and 9
+/// elements". Returns an empty string if the maps are equal.
 std::string first_difference(const RoadMap& a, const RoadMap& b);
 
 }  // namespace pictura

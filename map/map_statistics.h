@@ -8,22 +8,29 @@
 
 namespace pictura {
 
-/// Fractions of the quantiles of MapStatistics.
+/// Fractions at which MapStatistics takes quantiles.
 inline constexpr std::array<double, 3> kMapQuantiles{0.05, 0.5, 0.95};
-/// Radii that separate the classes of radius_shares.
+/// Radii of curves that separate the classes of MapStatistics::radius_shares.
 inline constexpr std::array<double, 3> kMapRadii_m{20, 50, 200};
 /// Minimum grade that counts as steep: 2 in 100.
 inline constexpr double kSteepGrade = 0.02;
 
-/// Statistics of a map. Shares and quantiles of driving lanes are weighted by length; they are 0 where nothing is
-/// counted.
+/// Statistics of a map. Shares and quantiles of driving lanes are weighted by length. They are 0 if the map has no such
+/// lanes.
 struct MapStatistics {
+  // Quantiles at kMapQuantiles.
   std::array<double, 3> lane_width_m{}, speed_limit_mps{};
-  std::array<double, 4> lanes_shares{};       // lanes in one direction outside junctions: 1, 2, 3, 4 or more
-  std::array<double, 4> radius_shares{};      // radii up to the first of kMapRadii_m, ..., above the last
-  double steep_share = 0, parking_share = 0;  // above kSteepGrade; parking lanes over driving lanes, by length
-  std::array<int, 4> junctions_of_arms{};     // number of roads that meet: up to 3, 4, 5, 6 or more
-  std::array<double, 3> head_ahead_m{};       // distances of lights beyond the middle of their stop lines
+  // Shares of the lanes outside junctions with 1, 2, 3, or at least 4 lanes side by side in their direction.
+  std::array<double, 4> lanes_shares{};
+  // Shares of lanes whose radius is at most kMapRadii_m[0], at most [1], at most [2], and larger.
+  std::array<double, 4> radius_shares{};
+  // Share of lanes steeper than kSteepGrade; length of parking lanes divided by that of driving lanes outside
+  // junctions.
+  double steep_share = 0, parking_share = 0;
+  // Numbers of junctions where at most 3, 4, 5, or at least 6 roads meet.
+  std::array<int, 4> junctions_of_arms{};
+  // Quantiles of the distance of a traffic light's head beyond the middle of its stop line.
+  std::array<double, 3> head_ahead_m{};
 };
 
 PICTURA_FIELDS(MapStatistics, lane_width_m, speed_limit_mps, lanes_shares, radius_shares, steep_share, parking_share,

@@ -1,6 +1,6 @@
 // Painted lines and road edges as they are drawn. Lines that the importer cut at lane sections, mark records and roads
-// are joined again. Duplicates from overlapping roads and road edges covered by paint are removed. The RoadMap keeps
-// every marking and its source.
+// are joined again. Duplicate lines of overlapping roads are removed, and so are road edges that painted lines cover.
+// The RoadMap itself keeps every marking and its source.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,8 @@
 
 namespace pictura {
 
-/// Maximum distance between the painted lines and the map's markings, in either direction: the deviation of the
-/// importer's chords from the file's curves, and a sixth of the width of a usual mark.
+/// Maximum distance between the painted lines and the map's markings, in either direction. It equals the importer's
+/// default chord error, and a sixth of the usual width of a mark.
 constexpr float kPaintTolerance_m = 0.02f;
 
 struct PaintedLine {
@@ -19,16 +19,16 @@ struct PaintedLine {
   MarkColor color = MarkColor::white;
 };
 
-/// Returns the map's markings as they are drawn: lines that other lines cover completely are removed, continuing lines
-/// of one width and colour are joined, and redundant points are removed within kPaintTolerance_m. Ends of lines and
-/// dashes do not move.
+/// Returns the map's markings as they are drawn. Lines that other lines cover completely are removed. Lines that
+/// continue each other with the same width and colour are joined. Points are removed if the line moves by at most
+/// kPaintTolerance_m. Ends of lines and dashes do not move.
 std::vector<PaintedLine> painted_lines(const RoadMap& map);
 
-/// Maximum width by which a road edge that is not drawn extends beyond the painted lines over it. Maps paint a line
-/// along the border of a road, and the chords of both may deviate from the border.
+/// Maximum width by which a covered road edge extends beyond the painted lines over it. Maps often paint a line along
+/// the border of a road. The chords of the line and of the edge may both deviate from the border, hence the factor.
 constexpr float kCoveredEdgeTolerance_m = 2 * kPaintTolerance_m;
 
-/// Returns the map's road edges, drawn `width_m` wide, except those covered by painted lines.
+/// Returns the map's road edges except those that painted lines cover. `width_m` is the drawn width of an edge.
 std::vector<RoadEdge> uncovered_edges(const RoadMap& map, const std::vector<PaintedLine>& lines, float width_m);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Linear map of the plan, by which a copy of a map differs from the map.
+// Linear transformation of the ground plane (the plan), which makes an affine copy of a map.
 #pragma once
 
 namespace pictura {

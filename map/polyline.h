@@ -1,5 +1,5 @@
-// Conversion of curves to polylines: chords deviate from the curve by at most a tolerance, with few points and pieces
-// of bounded length. Shared by all importers.
+// Conversion of curves to polylines, shared by all importers. The polylines have few points and pieces of bounded
+// length, and deviate from the curve by at most a tolerance.
 #pragma once
 
 #include <algorithm>
@@ -19,18 +19,18 @@
 
 namespace pictura {
 
-/// Length by which rounding may make pieces longer than the maximum.
+/// Length in metres by which rounding may make pieces longer than the maximum.
 constexpr double kPieceRounding = 1e-6;
 
-/// A sample of a curve: its parameter, its position, and a width (0 for a plain line), which is approximated too.
-/// Positions are in file or map coordinates, before rounding to float.
+/// A sample of a curve: its parameter, its position, and a width (0 for a line without width). Polylines approximate
+/// the width too. Positions are in file or map coordinates, before rounding to float.
 struct CurvePoint {
   double s = 0;
   Eigen::Vector3d position_m{0, 0, 0};
   double width = 0;
 };
 
-/// Distance in plan.
+/// Distance in plan: on the ground plane, without height.
 inline double plan_distance_m(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return hypot_of(b.x() - a.x(), b.y() - a.y());
 }
@@ -47,7 +47,7 @@ inline Vec3 to_vec3(const Eigen::Vector3d& p) {
 
 /// Deviation of `p` from the chord a-b: its distance in space, or half the error in width if that is larger.
 inline double chord_error(const CurvePoint& a, const CurvePoint& b, const CurvePoint& p) {
-  // Sums in plan first, so that the bits of maps do not change.
+  // Adds the height's term last, because another order would change the bits of imported maps.
   const auto dot = [](const Eigen::Vector3d& v, const Eigen::Vector3d& w) {
     return v.head<2>().dot(w.head<2>()) + v.z() * w.z();
   };
@@ -64,7 +64,8 @@ inline double chord_error(const CurvePoint& a, const CurvePoint& b, const CurveP
 /// farther apart.
 std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, double tolerance_m, double max_piece_m);
 
-/// Limit on the number of samples, so that no input can exhaust memory; also ends sampling if `work` is interrupted.
+/// Limit on the number of samples, so that no input can exhaust memory. count_sample() throws Error beyond the limit,
+/// and Interrupted if `work` is interrupted.
 class SampleBudget {
  public:
   /// `source` is the map's name in messages.
@@ -85,12 +86,12 @@ class SampleBudget {
   InterruptibleWork work_;
 };
 
-/// Places where a curve is cut for sampling; the curve is smooth between them. Values at the breaks themselves may
-/// belong to either formula.
+/// Parameters at which a curve is cut for sampling, because its formula changes there. The curve is smooth between
+/// breaks. At a break, either formula may determine the curve's value.
 struct CurveBreaks {
   std::vector<double> s;
-  // [s - 1], or empty: upper bound of the second derivatives by s of the position and of half the width, between two
-  // breaks; infinite where unknown.
+  // Upper bounds of the second derivatives with respect to s of the position and of half the width. There is one bound
+  // for each interval between two breaks, infinite if unknown. An empty vector means that all are unknown.
   std::vector<double> bend;
 };
 

@@ -1,5 +1,5 @@
-// Lanes that a file gives as polylines: their points, their links, and the junctions where they cross. Shared by the
-// importers of recorded scenes and of Lanelet2 maps.
+// Lanes from files that store them as polylines: their points, their links, and the junctions where they cross. Shared
+// by the importers of recorded scenes and of Lanelet2 maps.
 #pragma once
 
 #include <cstddef>
@@ -22,8 +22,9 @@ inline const LanePoint& end_of(const RoadMap& map, int32_t lane) {
   return points[points.size() - 1];
 }
 
-/// Appends the points (at least two, about the map's origin, none repeated) and sets the lane's range and length.
-/// Headings at inner points are between the directions of the chords that meet there.
+/// Appends a lane's points to the map, and sets the lane's range and length. There must be at least two points,
+/// relative to the map's origin, and none may equal the point before it. The heading at an inner point is midway
+/// between the directions of the chords before and after it.
 void append_lane_points(const std::vector<CurvePoint>& points, RoadMap* map, Lane* lane_out);
 
 /// Pairs (lane, successor).
@@ -37,7 +38,7 @@ struct LanePiece {
   Vec3 a_m, b_m;
   int32_t lane = 0;
 };
-/// Pieces of lanes in a grid, for searches of crossing and near lanes.
+/// Pieces of lanes in a grid, for searches for crossing or near lanes.
 struct LanePieces {
   std::vector<LanePiece> segments;
   Grid grid;
@@ -45,15 +46,16 @@ struct LanePieces {
 using LanePredicate = bool (*)(const Lane&);
 LanePieces segments_of(const RoadMap& map, LanePredicate is_wanted);
 
-/// Returns the point where two segments, ends included, cross in plan at about the same height; nothing for parallel
-/// segments.
+/// Returns the point where the segments a-b and c-d, ends included, cross in plan. Returns nothing if they do not
+/// cross, are parallel, or differ there in height by kSameRoadLevel_m or more.
 std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
 
-/// Marks as junction lanes the wanted lanes of different roads that cross each other, except at their ends. Adds
-/// junctions, and assigns to them these lanes and all lanes that are already marked. Lanes that cross, fork or merge
-/// belong to one junction, which has the name of the first lane's road. If bridged_m > 0, for roads that are cut into
-/// many lanes, junction lanes that follow each other belong to one junction too, as do wanted lanes of at most
-/// bridged_m between two junction lanes. `count_work` receives the work of loops whose length a file determines.
+/// Finds junctions. Wanted lanes of different roads that cross each other, except at their ends, become junction lanes.
+/// All junction lanes, including those marked before the call, are assigned to new junctions. Lanes that cross, fork or
+/// merge belong to one junction, which has the name of the first lane's road. bridged_m > 0 is for roads that are cut
+/// into many lanes: then junction lanes that follow each other also belong to one junction, and wanted lanes between
+/// two junction lanes become junction lanes if they are at most bridged_m long. `count_work` receives the number of
+/// steps of loops whose length the file determines.
 void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
                              const std::function<void(std::size_t)>& count_work, RoadMap* map);
 

@@ -1,4 +1,5 @@
-// Repairs of faults in a map's file that have one sensible meaning: the repair of each fault, and counts by kind.
+// Repairs of faults in a map's file. An importer repairs a fault if the faulty element has only one sensible meaning.
+// Repairs are counted by kind.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 
 namespace pictura {
 
-/// The kinds, in the order of the tables in docs/reference/opendrive.md and docs/reference/lanelet2.md.
+/// Kinds of repairs, in the order of the tables in docs/reference/opendrive.md and docs/reference/lanelet2.md.
 enum class RepairKind : uint8_t {
   record_order,
   record_beyond_end,
@@ -84,11 +85,12 @@ enum class RepairKind : uint8_t {
   empty_rule,
 };
 
-/// The first kind that only Lanelet2 files have; those before it are in the table of docs/reference/opendrive.md.
+/// First kind that only Lanelet2 files have. The table of docs/reference/opendrive.md lists the kinds before it.
 inline constexpr RepairKind kFirstLanelet2Repair = RepairKind::repeated_element;
 
-/// The fault, as "records out of order", and what is done about it, as "sorted".
+/// Returns the fault that a kind repairs, such as "records out of order".
 const char* to_string(RepairKind kind);
+/// Returns the importer's action for a kind of fault, such as "sorted by their stations".
 const char* action_of(RepairKind kind);
 
 /// Returns all kinds, in order.
@@ -108,11 +110,11 @@ struct RepairGroup {
   std::vector<const Repair*> repairs;  // in the order of their lines; not empty
 };
 
-/// Groups repairs by kind, the most frequent kinds first. The groups refer to `repairs`.
+/// Groups repairs by kind, the most frequent kinds first. The groups point into `repairs`.
 std::vector<RepairGroup> group_repairs(Span<const Repair> repairs);
 
-/// Describes repairs in one line per kind: their number, the repair, and the message of the first. Empty without
-/// repairs.
+/// Describes repairs in one line per kind: the number of repairs, the fault, the action, and the message of the first
+/// repair. Returns no lines if there are no repairs.
 std::vector<std::string> describe_repairs(Span<const Repair> repairs, const std::string& source);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// RoadMap: the validated, immutable road network that all other code reads, for any file format. Positions are float
-// metres relative to an origin kept in double. Indices refer to the vectors of the same RoadMap; -1 means none.
+// RoadMap: the validated, immutable road network that all other code reads, for any file format. Positions are floats,
+// in metres relative to an origin in double precision. Indices refer to the vectors of the same RoadMap; -1 means none.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ enum class LaneType : uint8_t {
   driving,
   bidirectional,
   parking,
-  ramp,  // drivable
+  ramp,  // the last drivable type
   shoulder,
   sidewalk,
   biking,
@@ -37,7 +37,7 @@ const char* to_string(LaneType type);
 /// Minimum difference in height between different levels of road, such as a bridge and the road below it.
 constexpr float kSameRoadLevel_m = 2.0f;
 
-/// A half-open range of elements of one of RoadMap's vectors.
+/// Half-open range of indices into one of RoadMap's vectors.
 struct IndexRange {
   int32_t begin = 0, end = 0;
   int32_t size() const { return end - begin; }
@@ -54,11 +54,11 @@ struct LanePoint {
 struct Lane {
   LaneType type = LaneType::other;
   bool in_junction = false;
-  bool is_endless = false;  // start of an unbounded route along successors (and lane changes)
+  bool is_endless = false;  // an unbounded route along successors and lane changes starts here
   int32_t junction = -1;
-  IndexRange points;                                // RoadMap::lane_points, at least two
-  IndexRange successors, predecessors;              // RoadMap::lane_links: lanes
-  int32_t left_neighbor = -1, right_neighbor = -1;  // same direction, driving or ramp; regardless of marks
+  IndexRange points;                                // in RoadMap::lane_points, at least two
+  IndexRange successors, predecessors;              // in RoadMap::lane_links, which holds lane indices
+  int32_t left_neighbor = -1, right_neighbor = -1;  // driving or ramp, same direction; marks are ignored
   float length_m = 0;
   float speed_limit_mps = 0;
   int32_t source_road = 0, source_section = 0, source_lane = 0;  // indices and id in the file; see RoadMap::road_names
@@ -67,9 +67,9 @@ struct Lane {
 enum class MarkColor : uint8_t { white, yellow, red, green, blue, orange, violet, black };
 const char* to_string(MarkColor color);
 
-/// A painted line, one per stripe or dash: a double line is two markings, a broken line is many.
+/// A painted stripe or dash. A double line is two markings, a broken line is many.
 struct Marking {
-  IndexRange points;  // RoadMap::marking_points, at least two
+  IndexRange points;  // in RoadMap::marking_points, at least two
   float width_m = 0;
   MarkColor color = MarkColor::white;
   bool broken = false;
@@ -81,7 +81,7 @@ struct RoadEdge {
 };
 
 struct Crosswalk {
-  IndexRange outline;  // RoadMap::outline_points, a closed ring without the repeated point
+  IndexRange outline;  // in RoadMap::outline_points: a ring that does not repeat its first point
 };
 
 struct ParkingSpace {
@@ -103,7 +103,7 @@ struct Sign {
   std::string country;
   Vec3 position_m;
   float heading_rad = 0;  // heading of the traffic to which the sign applies
-  IndexRange lanes;       // RoadMap::sign_lanes
+  IndexRange lanes;       // in RoadMap::sign_lanes
 };
 
 /// A traffic light: its stop line, head, phase, and the lanes that it controls (incoming and connecting lanes).
@@ -113,8 +113,8 @@ struct TrafficLight {
   Vec3 head_m;                 // centre of the head
   Vec2 head_facing;            // unit vector towards the controlled traffic
   int32_t junction = -1;       // -1: on a road away from junctions
-  int32_t phase = 0;           // rank of its controller in the junction; without controllers, rank by heading
-  IndexRange lanes;            // RoadMap::light_lanes, incoming lanes first, then connecting lanes
+  int32_t phase = 0;           // lights of one phase are green together; ranked by controller, else by heading
+  IndexRange lanes;            // in RoadMap::light_lanes, incoming lanes first, then connecting lanes
   std::string name;            // the signal's id in the file
 };
 
@@ -123,13 +123,13 @@ struct Junction {
   int32_t num_phases = 0;  // 0: no lights
 };
 
-/// A straight piece of a building line behind the sidewalk, along which walls may be placed.
+/// A straight piece of the line behind the sidewalk along which walls of buildings may be placed.
 struct BuildingLine {
   Vec3 a_m, b_m;  // the road lies to the right of a -> b
 };
 
-/// Source of an element: the road's index in RoadMap::road_names (-1: not on a road) and the line of the XML element
-/// (0: derived, or the map was not read from text).
+/// Source of an element in the map's file: the road's index in RoadMap::road_names (-1: not on a road), and the line of
+/// the XML element (0: the element is derived, or the map was not read from text).
 struct SourceElement {
   int32_t road = -1, line = 0;
 };
@@ -140,7 +140,8 @@ struct Provenance {
       junctions, building_lines;
 };
 
-/// Minimum length of counted lanes. Shorter lanes remain from roads without length and only link other lanes.
+/// Minimum length of the lanes that MapFacts counts. Shorter lanes come from roads without length, and only link other
+/// lanes.
 inline constexpr float kShortestLane_m = 0.01f;
 
 /// Counts that `pictura map` prints and that tests compare with the file.
@@ -186,7 +187,7 @@ struct RoadMap {
   }
 };
 
-/// Throws Error naming the element unless every index, length, width and coordinate is valid and links are mutual.
+/// Throws Error, which names the element, if an index, length, width or coordinate is invalid or a link is not mutual.
 void validate(const RoadMap& map);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Painted stripes along polylines: parallel lines, parts, and dashes. Shared by the importers.
+// Geometry of painted stripes along polylines: parallel lines, parts of lines, and dashes. Shared by the importers.
 #pragma once
 
 #include <vector>
@@ -19,7 +19,7 @@ std::vector<CurvePoint> part_of(const std::vector<CurvePoint>& line, double begi
 
 double plan_length_m(const std::vector<CurvePoint>& line);
 
-/// Dashes in the middle of the line; a short line is one dash.
+/// Returns dashes that are centred along the line, at least one.
 std::vector<std::vector<CurvePoint>> dashes_of(const std::vector<CurvePoint>& line);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Surfaces as bands between two borders, with queries for the bands that cover a position.
+// Surface that consists of bands, each between two borders, with queries for the bands that cover a position.
 #pragma once
 
 #include <bit>
@@ -13,35 +13,36 @@
 
 namespace pictura {
 
-/// A piece of surface between two borders with equally many points; `left` is on the left in their direction. Straight
-/// segments between the points bound the surface, so points must be dense enough.
+/// Piece of a surface between two borders with equally many points. `left` is the left border, seen in the direction of
+/// both borders. Straight segments between the points bound the surface, so the points must be dense enough.
 struct SurfaceBand {
   std::vector<Eigen::Vector3d> left, right;
 };
 
-/// All quads of all bands in a grid. Bands at least `level_m` above or below a position do not cover it. The total
-/// number of tested quads is bounded, far above the need of real road networks. With excessively overlapping bands,
-/// any_band_at() throws Error instead of running for hours.
+/// Grid of the quads of all bands. A band that is `level_m` or more above or below a position does not cover it. All
+/// queries together may test a limited number of quads, far more than real road networks need. Beyond the limit,
+/// queries throw Error, so that excessively overlapping bands do not cause hours of work.
 class Surface {
  public:
   Surface(const std::vector<SurfaceBand>& bands, double level_m);
 
-  /// Quads that may cover a point within kNear_m of `p`: a superset, from the cell of `p`.
+  /// Quads that may cover points within kNear_m of the position of find_near(), with all that do.
   struct Candidates {
     std::vector<int32_t> quads;
-    bool are_complete = false;  // false if the circle around `p` is in several cells
+    bool are_complete = false;  // false if the circle around the position is in several cells
   };
 
-  /// Finds the quads near `p`, so that several queries about one place share the lookup.
+  /// Finds the candidates near `p`, so that several queries near `p` share one lookup.
   void find_near(const Eigen::Vector2d& p, double z, Candidates* out) const;
 
-  /// Whether any band that `is_wanted` accepts covers `p`, which must be within kNear_m of the place of the candidates.
+  /// Whether `p` is covered by any band that is_wanted(band) accepts. `p` must be within kNear_m of the position of
+  /// find_near().
   template <typename IsWanted>
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted) const {
     return any_near(near, p, z, is_wanted, [](int32_t) { return true; });
   }
-  /// Whether `visit` returns true for any band that `is_wanted` accepts. `visit` is called only for bands that cover
-  /// `p`.
+  /// Calls visit(band) for bands that cover `p` and that is_wanted(band) accepts, until a call returns true; returns
+  /// whether a call did.
   template <typename IsWanted, typename Visit>
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted, Visit&& visit) const {
     if (!near.are_complete) return any_band_at(p, z, [&](int32_t band) { return is_wanted(band) && visit(band); });
@@ -53,8 +54,8 @@ class Surface {
   }
   static constexpr double kNear_m = 0.1;
 
-  /// Whether a quad of the band that is more than `reach_m` along the band from quad `from` covers `p`: in a turn
-  /// tighter than its width, a band folds over itself.
+  /// Whether the band folds over itself at `p`, as in a turn that is tighter than the band's width: any of its quads
+  /// covers `p` that is more than `reach_m` along the band from its quad `from`.
   bool is_folded_over(const Candidates& near, const Eigen::Vector2d& p, double z, int32_t band, std::size_t from,
                       double reach_m) const;
 
@@ -69,7 +70,7 @@ class Surface {
   struct Quad {
     Eigen::Vector2d corners_m[4];  // counter-clockwise: left, right, next right, next left
     double mean_z_m = 0;
-    double s_m = 0;  // station of its middle along the longer border
+    double s_m = 0;  // arc length from the band's start to the quad's middle, along the longer border
     int32_t band = 0;
   };
 
@@ -78,10 +79,10 @@ class Surface {
     Vec2 low, high;
     float low_z = 0, high_z = 0;
   };
-  /// Bounds of the grid's items in their order, with one array per side. They exclude most of a cell's quads, eight at
-  /// a time.
+  /// Bounds of the grid's items, in the order of the items, with one array per side. Queries test the bounds of eight
+  /// quads at a time, and so exclude most quads of a cell.
   struct ItemBounds {
-    static constexpr std::size_t kPadding = 7;  // eight are read from the last item on
+    static constexpr std::size_t kPadding = 7;  // because eight bounds are read from any item on
     std::vector<float> low_x, high_x, low_y, high_y, low_z, high_z;
 
     void reserve(std::size_t count);
