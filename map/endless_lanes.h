@@ -14,9 +14,8 @@ constexpr bool is_route(LaneType type) { return type == LaneType::driving || typ
 /// Groups of lanes that lane changes connect. A group's leftmost lane identifies it.
 struct LaneGroups {
   std::vector<std::size_t> of_lane;  // [lanes] leftmost lane of the lane's group
-  std::vector<std::vector<std::size_t>>
-      // [lanes] Members of the group whose leftmost lane is this lane; empty for other lanes.
-      members;
+  // [lanes] Members of the group whose leftmost lane is this lane; empty for other lanes.
+  std::vector<std::vector<std::size_t>> members;
 };
 LaneGroups group_lanes(const RoadMap& map);
 

@@ -17,14 +17,14 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Values of WOMD, from which the files are made; the files do not contain them.
+// Time step and steps of history of WOMD, from which the files are made. The files do not contain them.
 constexpr double kStep_s = 0.1;
 constexpr int32_t kHistorySteps = 10;
 constexpr int32_t kMaxId = 1'000'000'000;
 constexpr std::size_t kMaxLightStates = 8'000'000;
 
-/// Returns the text with null in place of NaN and Infinity, which Python writes although they are not JSON. Where a
-/// number is required, null is refused; invalid states are not read.
+/// Returns the text with null instead of NaN and Infinity, which Python writes although they are not JSON. Later, null
+/// is refused where a number is required. Invalid states are not read and may contain null.
 std::string with_null_for_nan(std::string_view text) {
   std::string out;
   out.reserve(text.size());
@@ -68,7 +68,7 @@ double number_of(const Json& object, const char* field) { return number_in(membe
 
 int64_t integer_in(const Json& value, const char* field) {
   if (!value.is_number_integer()) fail_field(field, "expected a whole number, got {}", value.type_name());
-  // Beyond int64_t, a number would be converted to another number.
+  // get<int64_t>() would silently change a number beyond the range of int64_t.
   const bool is_too_large = value.is_number_unsigned() && value.get<uint64_t>() > static_cast<uint64_t>(kMaxId);
   const int64_t number = is_too_large ? 0 : value.get<int64_t>();
   if (is_too_large || number < -kMaxId || number > kMaxId) {
@@ -97,7 +97,7 @@ Eigen::Vector3d point_of(const Json& object) {
   return {number_of(object, "x"), number_of(object, "y"), object.contains("z") ? number_of(object, "z") : 0.0};
 }
 
-/// Reads a centre. In flat geometry it has no z and is half of the height above the ground.
+/// Reads a centre. Flat geometry has no z; the centre is then half of the object's height above the ground.
 Eigen::Vector3d center_of(const Json& position, double height_m) {
   Eigen::Vector3d center = point_of(position);
   if (!position.contains("z")) center.z() = 0.5 * height_m;
@@ -170,7 +170,7 @@ void read_object(const Json& object, std::size_t index, LoggedScene* scene) {
   }
 }
 
-// Numbers of kinds: lanes 0 to 3, lines 5 to 13, edges 14 to 16, and one number each for the others.
+// Numbers of kinds of roads: lanes 0 to 3, lines 5 to 13, edges 14 to 16, and one number for each other kind.
 constexpr int64_t kSurfaceLane = 2, kLastLane = 3, kFirstLine = 5, kLastLine = 13, kLastEdge = 16, kStopSign = 17,
                   kCrosswalk = 18, kSpeedBump = 19, kDriveway = 20;
 
@@ -186,7 +186,7 @@ int64_t kind_of_road(const Json& road) {
 
 void read_road(const Json& road, std::size_t index, LoggedScene* scene) {
   const int64_t type = kind_of_road(road);
-  // Running numbers of some writers repeat; the index in the file does not.
+  // The index in the file is the id, because the ids of some writers repeat.
   const auto id = static_cast<int64_t>(index);
   const Json& geometry = array_of(road, "geometry");
   LoggedPoints points;
@@ -221,7 +221,7 @@ RecordedLightState light_state(const std::string& text) {
   fail_field("", "expected a state such as stop, caution, go or unknown, got '{}'", text);
 }
 
-/// Reads a light. `lane_ids`: index in the file of each lane, by its id as text.
+/// Reads a light. `lane_ids` maps the id of each lane, as text, to the lane's index in the file.
 void read_light(const std::string& lane, const Json& light, const std::map<std::string, int64_t>& lane_ids,
                 LoggedScene* scene) {
   const Json& states = array_of(light, "state");
@@ -294,8 +294,9 @@ void read_lights(const Json& lights, const Json& roads, LoggedScene* scene) {
   }
 }
 
-/// Converts headings in degrees, which older files have, to radians. Headings are degrees if those of moving objects
-/// then fit their motion better, or, unless they fit it worse, if any heading exceeds a whole turn in radians.
+/// Converts the headings of older files from degrees to radians. Headings are degrees if, read as degrees, the headings
+/// of moving objects fit their motion better. If they fit equally well, headings are degrees if any exceeds a whole
+/// turn in radians.
 void convert_degrees(LoggedScene* scene) {
   constexpr double kMoving_mps = 0.5, kLargest_rad = 6.3, kRadians = std::numbers::pi / 180;
   double fit = 0, fit_of_degrees = 0;  // sums of the cosines between heading and motion
@@ -323,7 +324,7 @@ void convert_degrees(LoggedScene* scene) {
 
 void read_metadata(const Json& metadata, LoggedScene* scene) {
   const auto tracks = static_cast<int64_t>(scene->tracks.size());
-  // Indices refer to the recording's tracks, some of which the file may lack.
+  // Indices refer to the tracks of the recording. The file may lack some of these tracks.
   const auto is_track = [&](int64_t index, const char* what) {
     if (index >= 0 && index < tracks) return true;
     scene->note("indices of the recording's tracks that are no object of the file left out", what);
@@ -331,7 +332,7 @@ void read_metadata(const Json& metadata, LoggedScene* scene) {
   };
   if (metadata.contains("sdc_track_index")) {
     const int64_t index = integer_of(metadata, "sdc_track_index");
-    // An object that is marked as the self-driving car takes precedence.
+    // An object that is itself marked as the self-driving car takes precedence over the index.
     if (scene->sdc_track < 0 && is_track(index, "sdc_track_index")) scene->sdc_track = static_cast<int32_t>(index);
   }
   if (metadata.contains("objects_of_interest")) {

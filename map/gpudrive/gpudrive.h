@@ -1,4 +1,4 @@
-// GPUDrive's JSON scenes, which PufferDrive's converters also read and ScenarioMax writes.
+// Importer of GPUDrive's JSON scenes. PufferDrive's converters read the same format, and ScenarioMax writes it.
 #pragma once
 
 #include <string>

@@ -1,4 +1,5 @@
-// Drivable areas beside lanes, and road edges: the outline of the whole drivable surface, and barriers between lanes.
+// Builds drivable areas beside lanes, and road edges from the outline of the whole drivable surface and from barriers
+// between lanes.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -46,7 +47,8 @@ bool crosses_itself(const Points& ring, SampleBudget* budget) {
   return false;
 }
 
-/// Splits a ring into triangles of its points' indices, by ear clipping; returns nullopt if the ring crosses itself.
+/// Splits a ring into triangles by ear clipping, and returns the indices of their corners. Returns nullopt if the ring
+/// crosses itself.
 std::optional<std::vector<std::array<std::size_t, 3>>> triangulate(const Points& ring, SampleBudget* budget) {
   if (crosses_itself(ring, budget)) return std::nullopt;
   std::vector<std::size_t> left(ring.size());
@@ -66,7 +68,7 @@ std::optional<std::vector<std::array<std::size_t, 3>>> triangulate(const Points&
     std::size_t ear = 0;
     while (ear < left.size() && !is_ear(ear)) ++ear;
     if (ear == left.size()) {
-      // Points on a straight line are not corners, and are removed.
+      // A point on a straight line is not a corner, and is removed.
       ear = 0;
       const auto corner = [&](std::size_t at) {
         return std::abs(
@@ -95,7 +97,7 @@ class AreaBuilder {
       for (const Points& ring : rings_of(relation, "outer")) add_surface(ring, relation);
       for (Points ring : rings_of(relation, "inner")) add_hole(&ring);
     }
-    // Autoware's parking lots, which are closed without a repeated point.
+    // Parking lots of Autoware's maps are closed without a repeated point.
     for (const Way& way : file_.ways) {
       if (way.tags.of("type") != "parking_lot" || way.nodes.size() < 3) continue;
       add_surface(without_repeated(build_.points_of(static_cast<int32_t>(&way - file_.ways.data()))), way);
@@ -117,7 +119,7 @@ class AreaBuilder {
     return ring;
   }
 
-  /// Returns the rings of the ways with a role, which are joined at shared points.
+  /// Joins the ways with a role at shared points, and returns the resulting rings.
   std::vector<Points> rings_of(const Relation& relation, std::string_view role) {
     std::vector<int32_t> ways = relation.ways(role);
     std::erase_if(ways, [&](int32_t way) { return file_.ways[way].nodes.size() < 2; });
@@ -165,7 +167,7 @@ class AreaBuilder {
     }
   }
 
-  /// The surface is around a hole, and thus on the right of a ring that runs counter-clockwise.
+  /// Adds the edges of a hole. The surface around the hole is on the right of a counter-clockwise ring.
   void add_hole(Points* ring) {
     if (signed_area(*ring) < 0) std::reverse(ring->begin(), ring->end());
     ring->push_back(ring->front());
@@ -180,7 +182,7 @@ class AreaBuilder {
   const OsmFile& file_;
 };
 
-/// Whether a line is a barrier that no vehicle crosses. Low curbs are not, since vehicles drive over them.
+/// Whether a line is a barrier that no vehicle crosses. A low curb is not a barrier, because vehicles drive over it.
 bool is_barrier(const Tags& tags) {
   const std::string_view type = tags.of("type");
   if (type == "curbstone") return tags.of("subtype") != "low";

@@ -16,7 +16,7 @@ namespace pictura::lanelet2 {
 
 using Points = std::vector<Eigen::Vector3d>;
 
-/// A way that borders a lane, in the direction of the lane's traffic.
+/// A way (polyline of the file) that borders a lane, in the direction of the lane's traffic.
 struct Border {
   int32_t way = -1;
   bool is_reversed = false;
@@ -30,7 +30,7 @@ struct Lanelet {
   int32_t relation = -1;
   int32_t road = -1;             // in RoadMap::road_names; -1 for crosswalks
   Border left, right;            // in the lanelet's direction
-  int32_t lane = -1, back = -1;  // lanes of the map; back: lane of the opposite traffic, if the lanelet is two-way
+  int32_t lane = -1, back = -1;  // lanes of the map; `back` is the opposite lane of a two-way lanelet
 };
 
 /// State shared by the stages.
@@ -42,15 +42,15 @@ struct Build {
   SampleBudget budget;
   std::vector<Lanelet> lanelets{};
   std::vector<int32_t> lanelet_of_relation{};           // [relations] index into lanelets, or -1
-  std::vector<std::pair<Border, Border>> lane_sides{};  // [map.lanes] left and right
-  std::vector<SurfaceBand> bands{};                     // drivable surface: lanes, then areas
+  std::vector<std::pair<Border, Border>> lane_sides{};  // [map.lanes] left and right border
+  std::vector<SurfaceBand> bands{};                     // drivable surface: bands of lanes, then of areas
   std::vector<int32_t> band_roads{};                    // [bands] index into road_names, or -1
 
   /// Converts file coordinates to map coordinates.
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const {
     return p - Eigen::Vector3d{map->origin_m[0], map->origin_m[1], map->origin_m[2]};
   }
-  /// Counts work on this number of items against the budget, so that no file can take minutes.
+  /// Counts `items` steps of work against the budget, so that no file can take minutes.
   void count_work(std::size_t items) {
     constexpr std::size_t kItemsPerSample = 8;
     for (std::size_t i = 0; i < items; i += kItemsPerSample) budget.count_sample();
@@ -66,7 +66,7 @@ struct Build {
   int32_t last_node(const Border& border) const { return first_node(border.reversed()); }
   const Relation& relation_of(const Lanelet& lanelet) const { return file.relations[lanelet.relation]; }
   SourceElement source_of(int32_t road, std::ptrdiff_t offset) const { return {road, file.source.line_at(offset)}; }
-  /// Returns the lane of a relation that is a lanelet; -1 for other relations and for crosswalks.
+  /// Returns the lane of a lanelet relation, or -1 for other relations and for crosswalks.
   int32_t lane_of(int32_t relation) const {
     const int32_t lanelet = lanelet_of_relation[relation];
     return lanelet < 0 ? -1 : lanelets[lanelet].lane;
@@ -81,18 +81,18 @@ Eigen::Vector3d point_at_fraction(const Points& line, double fraction);
 std::vector<CurvePoint> cut_line(const std::vector<CurvePoint>& line, SampleBudget* budget);
 std::vector<CurvePoint> cut_line(const Points& line, SampleBudget* budget);
 
-/// Whether vehicles may drive on a lanelet or area with these tags: by the tags participant:* if there are any, else by
-/// the subtype.
+/// Whether vehicles may drive on a lanelet or area with these tags. The tags participant:* decide if there are any,
+/// else the subtype.
 bool is_for_vehicles(const Tags& tags);
 
 /// Selects lanelets with two borders, aligns the borders, and sets the map's origin to the centre of their points, in
-/// whole metres. Throws Error if there is no lanelet, or naming a way's node that is too far from the origin.
+/// whole metres. Throws Error if there is no lanelet or if a node of a way is too far from the origin.
 void find_lanelets(Build* build);
-/// Builds lanes with links, neighbours, junctions and speed limits, and crosswalks.
+/// Builds lanes (with links, neighbours, junctions and speed limits) and crosswalks.
 void build_lanes(Build* build);
 /// Adds the surface of drivable areas to the bands.
 void build_areas(Build* build);
-/// Builds road edges: the outline of the bands, and barriers between lanes.
+/// Builds road edges from the outline of the bands and from barriers between lanes.
 void build_edges(Build* build);
 /// Builds markings, stop lines and parking spaces.
 void build_paint(Build* build);

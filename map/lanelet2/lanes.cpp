@@ -1,5 +1,5 @@
-// Construction of lanes from the pairs of borders of a Lanelet2 map: centre lines, links, neighbours, junctions and
-// speed limits.
+// Builds the lanes of a Lanelet2 map from pairs of borders: centre lines, links, neighbours, junctions and speed
+// limits.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -20,7 +20,8 @@ constexpr double kMaxWidth_m = 500.0;
 constexpr double kMaxRadius_m = 50e3;  // maximum distance of a map's points from its origin, along each axis
 constexpr float kBridged_m = 20.0f;    // maximum length of a lanelet between two lanelets of a junction
 
-/// Returns a positive number if `p` is on the left of the line. At a corner, the sum of both sides' normals decides.
+/// Returns a positive number if `p` is on the left of the line. If a corner of the line is nearest, the sum of the
+/// normals before and after the corner decides.
 double side_of(const Points& line, const Eigen::Vector3d& p) {
   double best_m = std::numeric_limits<double>::infinity(), side = 0;
   const auto normal_of = [&](std::size_t i) {
@@ -58,7 +59,7 @@ std::vector<double> fractions_of(const Points& line) {
   return fractions;
 }
 
-/// Returns the points at ascending fractions of a line. `own`: fractions of the line's own points.
+/// Returns the points at ascending fractions of a line's length. `own` contains the fractions of the line's own points.
 Points points_at(const Points& line, const std::vector<double>& own, const std::vector<double>& fractions) {
   Points points;
   std::size_t next = 1;
@@ -101,7 +102,7 @@ std::optional<LaneType> type_of_subtype(std::string_view subtype) {
   return found == types.end() ? std::nullopt : std::optional(found->second);
 }
 
-/// Whether a tag PREFIX:PARTICIPANT with the value yes covers the participant: vehicle covers vehicle:car.
+/// Whether a tag participant:NAME with the value yes covers the participant. For example, vehicle covers vehicle:car.
 bool is_allowed(const Tags& tags, std::string_view participant) {
   constexpr std::string_view kPrefix = "participant:";
   return std::any_of(tags.begin(), tags.end(), [&](const auto& tag) {
@@ -111,7 +112,7 @@ bool is_allowed(const Tags& tags, std::string_view participant) {
   });
 }
 
-/// Returns the lane type that the tags participant:* state; nullopt without such tags.
+/// Returns the lane type that the tags participant:* define, or nullopt if there are none.
 std::optional<LaneType> type_of_participants(const Tags& tags) {
   if (std::none_of(tags.begin(), tags.end(), [](const auto& tag) { return tag.first.starts_with("participant:"); })) {
     return std::nullopt;
@@ -124,8 +125,8 @@ std::optional<LaneType> type_of_participants(const Tags& tags) {
   return is_allowed(tags, "pedestrian") ? LaneType::sidewalk : LaneType::restricted;
 }
 
-/// Returns the speed limit for a lane without one in the file. Limits are those of Germany, on which Lanelet2's own
-/// rules are modelled. A missing location counts as urban, as in Lanelet2.
+/// Returns the speed limit of a lane for which the file has none. The limits are Germany's, because Lanelet2's own
+/// rules follow them. A missing location counts as urban, as in Lanelet2.
 double default_speed_mps(const Tags& tags) {
   const std::string_view subtype = tags.of("subtype"), location = tags.of("location");
   const bool is_nonurban = location == "nonurban";
@@ -217,7 +218,7 @@ class LaneBuilder {
     build_.band_roads.push_back(lanelet->road);
   }
 
-  /// Sets widths: the distance between the borders, perpendicular to the centre line.
+  /// Sets the widths of a lane to the distance between its borders, perpendicular to the centre line.
   static void set_widths(const SurfaceBand& band, std::vector<CurvePoint>* line) {
     std::vector<CurvePoint>& points = *line;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -262,7 +263,8 @@ class LaneBuilder {
     return static_cast<int32_t>(map_.lanes.size()) - 1;
   }
 
-  /// Returns the speed limit of a regulatory element, else of the lanelet's tags, else of its subtype and location.
+  /// Returns the speed limit of a regulatory element if there is one, else of the lanelet's tags, else of its subtype
+  /// and location.
   double speed_limit_mps(const Relation& relation) const {
     for (const int32_t index : relation.relations("regulatory_element")) {
       const Relation& rule = file_.relations[index];
@@ -338,7 +340,7 @@ class LaneBuilder {
     return subtype == "dashed" || subtype == "dashed_solid" || subtype == "solid_dashed";
   }
 
-  /// Sets neighbours: lanes of the same direction that share a border which traffic may cross.
+  /// Sets the neighbours of lanes. Neighbours have the same direction, and share a border that traffic may cross.
   void set_neighbors() {
     std::map<Border, std::vector<int32_t>> lanes_left_of;
     const auto is_route = [&](int32_t lane) { return map_.lanes[lane].type == LaneType::driving; };
@@ -362,8 +364,8 @@ class LaneBuilder {
     }
   }
 
-  /// Whether `lane` is `other` or one of its left neighbours. Such lanes must not be joined, since neighbours would
-  /// form a ring.
+  /// Whether `lane` is `other` or a lane on the left of `other`. Then `other` must not become the left neighbour of
+  /// `lane`, because the neighbours would form a ring.
   bool is_leftmost_of(int32_t lane, int32_t other) {
     while (other >= 0 && other != lane) {
       other = map_.lanes[other].left_neighbor;
@@ -444,8 +446,8 @@ void find_lanelets(Build* build) {
       continue;
     }
     Lanelet lanelet{.relation = static_cast<int32_t>(i), .left = {left[0]}, .right = {right[0]}};
-    // As in Lanelet2, the left border is reversed unless the middle of the right border is on its right, and the right
-    // border is reversed unless the middle of the left border is on its left.
+    // As in Lanelet2, a border is reversed if the middle of the other border is not on the expected side: on the right
+    // of the left border, and on the left of the right border.
     if (side_of(build->points_of(lanelet.left), middle_of(build->points_of(lanelet.right))) >= 0) {
       lanelet.left.is_reversed = true;
     }

@@ -1,5 +1,5 @@
-// Contents of a Lanelet2 file: points, lines and relations as in OpenStreetMap's XML, with checked ids and numbers and
-// resolved references. Indices refer to the vectors of the same OsmFile.
+// Contents of a Lanelet2 file: nodes (points), ways (lines) and relations, as in OpenStreetMap's XML. Ids and numbers
+// are checked, and references are resolved. Indices refer to the vectors of the same OsmFile.
 #pragma once
 
 #include <cstddef>
@@ -21,11 +21,11 @@
 
 namespace pictura::lanelet2 {
 
-/// Returns true for the texts that Lanelet2 reads as true, false for those that it reads as false, nullopt for all
+/// Returns true for texts that Lanelet2 reads as true, false for texts that it reads as false, and nullopt for all
 /// others.
 std::optional<bool> flag_of(std::string_view value);
 
-/// Keys and values of an element, in the order of the file. Refers to the document, which must outlive it.
+/// Keys and values of an element, in the order of the file. Tags point into the document, which must outlive them.
 class Tags {
  public:
   void add(std::string_view key, std::string_view value) { tags_.emplace_back(key, value); }
@@ -46,8 +46,8 @@ struct Node {
   int64_t id = 0;
   std::ptrdiff_t offset = 0;
   std::optional<GeoPoint> geo;
-  std::optional<GridPoint> local;  // local_x and local_y
-  std::string_view mgrs;           // mgrs_code, or empty
+  std::optional<GridPoint> local;  // tags local_x and local_y
+  std::string_view mgrs;           // tag mgrs_code, or empty
   DashMark dash = DashMark::none;
   bool has_position = false;
   Eigen::Vector3d position_m{0, 0, 0};  // in the map's file coordinates; set by place_nodes()
@@ -66,7 +66,7 @@ struct Relation {
   Tags tags;
   struct Member {
     std::string_view role;
-    int32_t way = -1, relation = -1;  // one of both; the other is -1
+    int32_t way = -1, relation = -1;  // one of the two; the other is -1
   };
   std::vector<Member> members;
 
@@ -81,11 +81,11 @@ struct OsmFile {
   std::vector<Node> nodes;
   std::vector<Way> ways;
   std::vector<Relation> relations;
-  std::string geo_reference;  // reference of the coordinates, a PROJ string; may be empty
+  std::string geo_reference;  // geographic reference of the coordinates, a PROJ string; may be empty
 
   opendrive::SourceLocation where(const Node& node) const { return place("node", "node", node); }
   opendrive::SourceLocation where(const Way& way) const { return place("way", "way", way); }
-  /// Location whose owner is the relation's kind and id, such as "lanelet 12".
+  /// Returns a location whose owner is the relation's kind and id, such as "lanelet 12".
   opendrive::SourceLocation where(const Relation& relation) const;
 
  private:
@@ -95,18 +95,19 @@ struct OsmFile {
   }
 };
 
-/// Reads `text`; `name` is the file's name in messages. Repairs the faults that docs/reference/lanelet2.md lists.
-/// Throws Error naming file, line and element for all other faults.
+/// Reads `text`. `name` is the file's name in messages. Repairs the faults that docs/reference/lanelet2.md lists.
+/// Throws Error, which names file, line and element, for all other faults.
 void read_osm(std::string_view text, const std::string& name, opendrive::Faults* faults, OsmFile* file_out);
 
 /// Sets the positions of all nodes and the geographic reference, and removes nodes without a position from ways. With
-/// `origin`, positions are UTM coordinates minus those of the origin; else local coordinates, if any node has them;
-/// else UTM coordinates in the zone of the first node. `plan`, the plan of a copy, is then applied to the positions.
+/// `origin`, positions are UTM coordinates minus those of the origin. Without it, positions are local coordinates if
+/// any node has them, else UTM coordinates in the zone of the first node. Finally, `plan` (the plan of a copy) is
+/// applied to the positions.
 void place_nodes(const std::optional<GeoPoint>& origin, const PlanMap& plan, opendrive::Faults* faults,
                  OsmFile* file_inout);
 
-/// Parses a speed limit like "50", "50 km/h", "25 mph" or "13.9 m/s" and returns it in m/s; without a unit the number
-/// is in km/h. Returns nullopt for other texts, and for speeds that cannot be a limit.
+/// Parses a speed limit like "50", "50 km/h", "25 mph" or "13.9 m/s", and returns it in m/s. A number without a unit is
+/// in km/h. Returns nullopt for other texts, and for speeds that cannot be a limit.
 std::optional<double> parse_speed_mps(std::string_view text);
 
 }  // namespace pictura::lanelet2

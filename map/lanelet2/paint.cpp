@@ -1,4 +1,4 @@
-// Construction of paint from a Lanelet2 map: lines with their dashes, stop lines, parking spaces.
+// Builds the paint of a Lanelet2 map: lines with their dashes, stop lines and parking spaces.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -49,7 +49,7 @@ class Painter {
     if (type == "parking_space") add_parking_space(index);
   }
 
-  /// Returns the tag `width` in metres; 0 if it is missing or out of [0.01, high_m].
+  /// Returns the value of the tag `width` in metres, or 0 if it is missing or outside [0.01, high_m].
   double width_of(const Way& way, double high_m) const {
     const std::optional<double> width_m = parse_written_number(way.tags.of("width"));
     return width_m && *width_m >= 0.01 && *width_m <= high_m ? *width_m : 0;

@@ -73,15 +73,16 @@ std::optional<MgrsPlace> parse_mgrs(std::string_view code) {
   const int band = mgrs_letter(code[at]), column = mgrs_letter(code[at + 1]), row = mgrs_letter(code[at + 2]);
   constexpr int kBandC = 2, kBandN = 12, kBandX = 21, kRows = 20;
   if (band < kBandC || band > kBandX || column < 0 || row < 0 || row >= kRows) return std::nullopt;
-  // Columns have eight letters per zone and repeat every three zones. Rows repeat every 2000 km; even zones begin with
-  // F.
+  // Each zone has eight column letters, which repeat every three zones. Row letters repeat every 2000 km. Rows of even
+  // zones begin with F.
   const int easting = column - 8 * ((number - 1) % 3);
   if (easting < 0 || easting >= 8) return std::nullopt;
   MgrsPlace place;
   place.zone = {number, band < kBandN};
   place.square_m.x_m = (easting + 1) * kSquare_m;
   const double in_cycle_m = ((row + (number % 2 == 0 ? kRows - 5 : 0)) % kRows) * kSquare_m;
-  // The repeated square that reaches into the band is used. Bands are 8 degrees high, the northernmost 12.
+  // Of the squares with this row letter, the code means the square that overlaps the band. Bands are 8 degrees high,
+  // but the northernmost is 12 degrees high.
   const double south_deg = 8.0 * (band - kBandN), north_deg = south_deg + (band == kBandX ? 12 : 8);
   const double meridian_deg = central_meridian_deg(place.zone);
   const double low_m = to_utm({south_deg, meridian_deg}, place.zone).y_m - kSquare_m;

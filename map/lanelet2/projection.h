@@ -1,4 +1,4 @@
-// Projections of latitude and longitude to metres that Lanelet2 maps use: UTM, and squares of MGRS.
+// Projections from latitude and longitude to metres, as Lanelet2 maps use them: UTM, and squares of MGRS.
 #pragma once
 
 #include <optional>
@@ -28,20 +28,20 @@ struct UtmZone {
 /// Returns the zone of a place, including the exceptions for Norway and Svalbard. The latitude must be in [-80, 84].
 UtmZone utm_zone_of(const GeoPoint& place);
 
-/// Returns the coordinates of a place in a zone, which may be another zone than the place's own. Computed by Krueger's
-/// series in the third flattening to the sixth order, whose error is below 1e-6 m within 3000 km of the central
-/// meridian (Karney, Transverse Mercator with an accuracy of a few nanometers, 2011).
+/// Returns the coordinates of a place in a zone. The place may be outside the zone. Uses Krueger's series in the third
+/// flattening to the sixth order. Its error is below 1e-6 m within 3000 km of the zone's central meridian (Karney,
+/// Transverse Mercator with an accuracy of a few nanometers, 2011).
 GridPoint to_utm(const GeoPoint& place, const UtmZone& zone);
 
 /// Place of an MGRS code, such as 54SVE8155012345.
 struct MgrsPlace {
   UtmZone zone;
-  GridPoint square_m;  // south-west corner of the place's square of 100 km, in the zone
+  GridPoint square_m;  // south-west corner of the place's 100 km square, in the zone
   GridPoint offset_m;  // offset within the square; the code's digits determine its resolution
 };
 
-/// Returns the place of a code of zone, band, square and at most ten digits. Returns nullopt if the text is not a code
-/// of this form, or if the square does not exist.
+/// Returns the place of an MGRS code, which consists of zone, band, square and at most ten digits. Returns nullopt if
+/// the text is not such a code, or if the square does not exist.
 std::optional<MgrsPlace> parse_mgrs(std::string_view code);
 
 /// Returns the PROJ string of UTM coordinates minus `shift_m`.

@@ -1,4 +1,4 @@
-// Reader of OpenStreetMap's XML: nodes, then ways, then relations, in whichever order the file contains them.
+// Reads OpenStreetMap's XML: first nodes, then ways, then relations, whatever their order in the file.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -130,7 +130,7 @@ class Reader {
       const int64_t id = integer(reference, "ref");
       const std::string_view type = reference.attribute("type").value(), role = reference.attribute("role").value();
       const bool is_way = type == "way";
-      if (!is_way && type != "relation") continue;  // no member node has a role that is read
+      if (!is_way && type != "relation") continue;  // roles of member nodes are not used
       const Index& index = is_way ? way_of_id_ : relation_of_id_;
       const auto found = index.find(id);
       if (found == index.end()) {
@@ -149,7 +149,7 @@ class Reader {
   Index node_of_id_, way_of_id_, relation_of_id_;
 };
 
-/// Coordinates of a file's nodes, chosen by the kinds of coordinates that the nodes have.
+/// Determines the coordinates of a file's nodes from the kinds of coordinates that the nodes have.
 class Placement {
  public:
   Placement(const std::optional<GeoPoint>& origin, OsmFile* file) : file_(*file) {
@@ -157,7 +157,7 @@ class Placement {
     const auto with_geo = std::find_if(nodes.begin(), nodes.end(), [](const Node& n) { return n.geo.has_value(); });
     is_local_ = !origin && std::any_of(nodes.begin(), nodes.end(), [](const Node& n) { return n.local.has_value(); });
     if (is_local_) {
-      // Autoware's local coordinates are offsets within the MGRS square.
+      // Local coordinates of Autoware's maps are offsets within an MGRS square.
       for (const Node& node : nodes) {
         const std::optional<MgrsPlace> square = parse_mgrs(node.mgrs);
         if (!square) continue;

@@ -1,4 +1,4 @@
-// Construction of traffic lights and signs from the regulatory elements of a Lanelet2 map, and the map's counts.
+// Builds traffic lights and signs from the regulatory elements of a Lanelet2 map, and counts the map's facts.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,14 +17,14 @@ namespace pictura::lanelet2 {
 
 namespace {
 
-// Heights of near and far heads above the stop line, as for OpenDRIVE, if the file has none. The file has a height if
-// the head is at least kLowestHead_m above the line.
+// Default heights of near and far heads above the stop line, as for OpenDRIVE. They apply if the file's head is less
+// than kLowestHead_m above the line.
 constexpr float kNearHeadHeight_m = 3.5f, kFarHeadHeight_m = 5.5f, kLowestHead_m = 1.5f;
 constexpr float kFarHead_m = 5.0f;
 constexpr float kMinStopLine_m = 0.1f;
 constexpr float kJunctionAhead_m = 40.0f;  // maximum distance along lanes from a light to its junction
 
-/// Returns the place along a lane that is nearest to a point, as a fraction from 0 to 1.
+/// Returns the position on a lane that is nearest to a point, as a fraction of the lane's length.
 float nearest_share(const RoadMap& map, int32_t lane, Vec3 p) {
   const Span<const LanePoint> points = map.points_of(map.lanes[lane]);
   float best_m = std::numeric_limits<float>::infinity(), s_m = 0;
@@ -74,15 +74,16 @@ class RuleBuilder {
  private:
   /// Heads, lanes and stop line of one or several regulatory elements.
   struct Approach {
-    int32_t relation = -1;        // first of these elements
+    int32_t relation = -1;        // the first of the elements
     int32_t stop_line = -1;       // way, or -1
     std::vector<int32_t> heads;   // ways
-    std::vector<int32_t> tagged;  // lanes that refer to one of these elements
+    std::vector<int32_t> tagged;  // lanes that refer to any of the elements
     std::vector<int32_t> incoming, connecting;
   };
 
-  /// Adds a regulatory element to its light. Elements that share a stop line (without one: the same heads) are one
-  /// light, since Autoware's maps have an element for each onward lane.
+  /// Adds a regulatory element to its light. Elements with the same stop line are one light, because Autoware's maps
+  /// have an element for each lane behind the line. Elements without a stop line are one light if they have the same
+  /// heads.
   void collect_light(int32_t index) {
     const Relation& relation = file_.relations[index];
     const auto usable = [&](std::string_view role) {
@@ -147,8 +148,8 @@ class RuleBuilder {
       (begins_there ? approach->connecting : approach->incoming).push_back(index);
       if (begins_there) add_driving(lane.predecessors, &approach->incoming);
     }
-    // A lane may be incoming by one regulatory element and connecting by another. It is then only connecting, since it
-    // does not lead to the line.
+    // One regulatory element may make a lane incoming, and another may make it connecting. Such a lane is only
+    // connecting, because it does not lead to the stop line.
     sort_unique(&approach->incoming);
     sort_unique(&approach->connecting);
     std::erase_if(approach->incoming, [&](int32_t lane) {
@@ -158,7 +159,7 @@ class RuleBuilder {
     sort_unique(&approach->connecting);
   }
 
-  /// Sets the stop line, its left end first, and its heading.
+  /// Sets the light's stop line (its left end first) and its heading.
   void set_stop_line(const Approach& approach, TrafficLight* light) const {
     const bool is_incoming = !approach.incoming.empty();
     const int32_t lane = is_incoming ? approach.incoming.front() : approach.connecting.front();
@@ -172,7 +173,7 @@ class RuleBuilder {
       if (dot((light->stop_a_m - light->stop_b_m).xy(), left) < 0) std::swap(light->stop_a_m, light->stop_b_m);
       return;
     }
-    // Without a stop line in the file, the line spans the ends of the lanes.
+    // If the file has no stop line, the line spans the ends of the lanes.
     float left_m = -1e30f, right_m = 1e30f;
     for (const int32_t each : is_incoming ? approach.incoming : approach.connecting) {
       const LanePoint& end = is_incoming ? end_of(map_, each) : start_of(map_, each);
@@ -212,7 +213,7 @@ class RuleBuilder {
     map_.provenance.lights.push_back(build_.source_of(-1, relation.offset));
   }
 
-  /// Returns the first junction on the lanes after a light, or -1.
+  /// Returns the first junction on the lanes behind a light's stop line, or -1 if there is none.
   int32_t junction_ahead(const Approach& approach) const {
     std::vector<std::pair<int32_t, float>> ahead;  // lanes, and the distance to their start
     std::set<int32_t> known(approach.connecting.begin(), approach.connecting.end());
@@ -233,7 +234,7 @@ class RuleBuilder {
     return -1;
   }
 
-  /// Sets the head. Of several heads the one farthest ahead is used, which waiting vehicles can see.
+  /// Sets the light's head to the head that is farthest ahead, because waiting vehicles can see it.
   void set_head(const Approach& approach, Vec2 forward, TrafficLight* light) const {
     const Vec3 middle = (light->stop_a_m + light->stop_b_m) * 0.5f;
     float best_m = -std::numeric_limits<float>::infinity();
@@ -268,7 +269,7 @@ class RuleBuilder {
       Sign sign{.name = std::to_string(way.id)};
       set_type(way.tags.of("subtype"), &sign);
       sign.position_m = center_of(index);
-      // As seen by the traffic, a sign's line runs from its left edge to its right edge.
+      // The line of a sign runs from the sign's left edge to its right edge, as seen by traffic.
       const Points line = build_.points_of(index);
       const Eigen::Vector2d right = (line.back() - line.front()).head<2>();
       sign.heading_rad = static_cast<float>(std::atan2(right.x(), -right.y()));
@@ -291,8 +292,8 @@ class RuleBuilder {
         ->heading_rad;
   }
 
-  /// Sets a sign's type from a region and a number, like de206 or usR1-1. Autoware's stop_sign becomes 206 of
-  /// OpenDRIVE's catalogue.
+  /// Sets a sign's type from a subtype such as de206 or usR1-1, which consists of region and number. Autoware's
+  /// stop_sign becomes 206 of OpenDRIVE's catalogue.
   static void set_type(std::string_view subtype, Sign* sign) {
     if (subtype == "stop_sign") {
       sign->type = "206";

@@ -12,7 +12,7 @@ using opendrive::Profile;
 constexpr double kSlipTaper_m = 14;
 constexpr double kMarkWidth_m = 0.12;
 
-/// Smooth step (cubic) from one width to another over `length_m`, starting at s.
+/// Returns a cubic step from one width to another over `length_m`, which starts at s.
 Cubic step(double s, double from_m, double to_m, double length_m) {
   const double rise = to_m - from_m;
   return {s, from_m, 0, 3 * rise / (length_m * length_m), -2 * rise / (length_m * length_m * length_m)};

@@ -1,4 +1,4 @@
-// Cross-sections of roads, and the lane sections made from them.
+// Cross-sections of roads, and the lane sections that are made from them.
 #pragma once
 
 #include <optional>
@@ -9,34 +9,36 @@ namespace pictura::town {
 
 enum class LaneKind { median, driving, slip, parking, shoulder, sidewalk };
 
-/// One side of a road, from the reference line outwards: half of a median, driving lanes, then a slip lane, a parking
-/// bay, a shoulder and a sidewalk, each optional.
+/// One side of a road. Lanes from the reference line outwards: half of a median, driving lanes, a slip lane (for right
+/// turns), a parking bay, a shoulder and a sidewalk. All but the driving lanes are optional.
 struct Side {
   int driving = 1;
   bool has_median = false, has_slip = false, has_parking = false, has_shoulder = true, has_sidewalk = true;
 
-  /// Position of the lane of this kind (for driving lanes, the `index`-th), counted from 1 at the reference line; 0:
-  /// none.
+  /// Returns the position of the lane of this kind, counted from 1 at the reference line; 0 if there is none. `index`
+  /// selects among the driving lanes.
   int rank(LaneKind kind, int index = 0) const;
-  /// Index of the driving lane at a position.
+  /// Returns the index of the driving lane at a position.
   int index_at(int rank) const { return rank - 1 - (has_median ? 1 : 0); }
   int count() const;
   LaneKind kind_at(int rank) const;
 };
 inline constexpr Side kNoSide{.driving = 0, .has_shoulder = false, .has_sidewalk = false};
 
-/// Properties of a section other than the kinds of its lanes.
+/// Properties of a lane section, except the kinds of its lanes.
 struct SectionStyle {
   explicit SectionStyle(double lane_width_m)
       : driving_from_m(lane_width_m), driving_middle_m(lane_width_m), driving_to_m(lane_width_m) {}
 
   bool in_junction = false;
   bool one_way = false;  // no left side
-  // Width of driving lanes at the start, half-way and at the end; slip lanes have the first width throughout.
+  // Width of driving lanes at the start, in the middle and at the end of the section. Slip lanes have the first width
+  // everywhere.
   double driving_from_m, driving_middle_m, driving_to_m;
 };
 
-// Parking bays open and close over the taper, at a distance (lead) from the ends of their section.
+// Parking bays begin and end at the distance kParkingLead_m from the ends of their section, and widen and narrow over
+// the length kParkingTaper_m.
 inline constexpr double kParkingLead_m = 4, kParkingTaper_m = 4;
 
 /// Makes a section's lanes, with widths and marks but without links. Slip lanes open towards the section's end on the

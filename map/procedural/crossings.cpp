@@ -1,5 +1,4 @@
-// Construction of junctions of three to five arms: one connecting road per movement, corners with sidewalks,
-// crosswalks.
+// Builds junctions of three to five arms: one connecting road per movement, corners with sidewalks, and crosswalks.
 #include "pictura/map/procedural/town_builder.h"
 
 namespace pictura::town {
@@ -7,7 +6,7 @@ namespace pictura::town {
 namespace {
 
 constexpr double kMaxTurnRadius_m = 14;  // radius of the left border of all turns except right turns
-// Additional width half-way of lanes that turn across the junction, so that no sliver remains between adjacent lanes.
+// Additional width in the middle of lanes that turn across the junction, so that no gap remains between adjacent lanes.
 constexpr double kTurningExtra_m = 0.5;
 constexpr double kCrosswalkBegin_m = 0.6, kCrosswalkEnd_m = 3.4;  // distance beyond the stop line
 
@@ -36,7 +35,7 @@ int TownBuilder::build_movement(const Node& node, const Movement& movement, open
   const bool has_median = in.kind == StreetKind::motorway && out.kind == StreetKind::motorway;
   const Pose start = offset_right(reversed(mouth_of(node, from)), has_median ? 0 : lane_offset_m(in, first_in));
   const Pose end = offset_right(mouth_of(node, to), has_median ? 0 : lane_offset_m(out, movement.first_out));
-  // A right turn into the next arm makes a corner, whose sidewalk follows the outermost lane.
+  // A right turn into the next arm has a corner. Its sidewalk follows the outermost lane.
   const bool turns_right = movement.to == (movement.from + 1) % node.degree();
   const int in_lanes = in.lanes + (layout_.has_slip(from) ? 1 : 0);
   const bool has_corner =
@@ -62,8 +61,8 @@ int TownBuilder::build_movement(const Node& node, const Movement& movement, open
   return connecting;
 }
 
-/// Adds a crosswalk across the arm, just inside the junction, from kerb to kerb; `owner_road` begins at the arm's
-/// centre.
+/// Adds a crosswalk across the arm, just inside the junction, from kerb to kerb. The crosswalk belongs to `owner_road`,
+/// which begins at the centre of the arm.
 void TownBuilder::add_crosswalk(const Arm& arm, int owner_road) {
   const Street& street = street_of(arm);
   const double out = lane_offset_m(street, street.lanes) + kShoulderWidth_m;

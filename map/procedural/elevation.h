@@ -6,13 +6,14 @@
 namespace pictura::town {
 
 inline constexpr double kMaxGrade = 0.075;
-// Fraction of a street over which its grade rises from 0, and over which it falls back to 0.
+// Fraction of a street's length over which the grade rises from 0. Over the same fraction at the street's end, it falls
+// to 0.
 inline constexpr double kVerticalCurveFraction = 0.25;
 
 /// Maximum height difference of a street of this length.
 inline double max_climb_m(double length_m) { return kMaxGrade * (1 - kVerticalCurveFraction) * length_m; }
 
-/// Profile from one height to another: a parabola, a constant grade, a parabola; level at both ends.
+/// Returns a profile from one height to another that is level at both ends: a parabola, a constant grade, a parabola.
 inline opendrive::Profile elevation_profile(double from_m, double to_m, double length_m) {
   if (from_m == to_m) return {{{0, from_m, 0, 0, 0}}};
   const double curve = kVerticalCurveFraction * length_m;

@@ -1,4 +1,4 @@
-// Selection of the crossings, streets and features of a town.
+// Selects the crossings, streets and features of a town.
 #include "pictura/map/procedural/layout.h"
 
 #include <cmath>
@@ -8,8 +8,7 @@ namespace pictura::town {
 
 namespace {
 
-// Usual lane width; variation of block lengths as a fraction of their mean; and variation of node positions in each
-// coordinate.
+// Usual lane width, variation of block lengths as a fraction of their mean, and variation of each coordinate of nodes.
 constexpr double kUsualLaneWidth_m = 3.5;
 constexpr double kSpacingSpread = 0.12, kJitter_m = 3.5;
 
@@ -97,12 +96,13 @@ void Layout::plan_streets() {
 /// Chooses avenues: the border, and whole rows and columns inside it.
 void Layout::choose_avenues() {
   has_ring_road_ = draw(kRingRoad, 0).uniform() < static_cast<float>(options_.ring_road) && options_.max_lanes > 1;
-  // An avenue ends at the border, where half of its lanes turn left and half turn right.
+  // An avenue ends at the border, where half of its lanes turn left and half turn right. So without a ring road it has
+  // at most two lanes per direction.
   const auto lanes_of = [&](int line) {
     const int max_lanes = static_cast<int>(has_ring_road_ ? options_.max_lanes : std::min(options_.max_lanes, 2.0));
     return 2 + draw(kAvenueLanes, line).below(max_lanes - 1);
   };
-  std::vector<int> lines;  // rows from 0, columns from kMaxTownBlocks
+  std::vector<int> lines;  // row indices, and kMaxTownBlocks plus column indices
   for (int j = 1; j < options_.blocks_y; ++j) lines.push_back(j);
   for (int i = 1; i < options_.blocks_x; ++i) lines.push_back(kMaxTownBlocks + i);
   if (options_.max_lanes < 2) lines.clear();
@@ -121,7 +121,8 @@ void Layout::choose_avenues() {
   }
 }
 
-/// Chooses inner nodes without adjacent pairs, those on avenues first, so that each ramp can use a whole street.
+/// Chooses inner nodes for overpasses, nodes on avenues first. No two overpasses are adjacent, so that each rise can
+/// use a whole street.
 void Layout::choose_overpasses() {
   std::vector<int> inner;
   for (int n = 0; n < static_cast<int>(nodes_.size()); ++n) {
@@ -193,7 +194,7 @@ void Layout::add_diagonals() {
     is_cut = has_diagonal[node] = has_diagonal[to] = 1;
     return true;
   };
-  // Around a single block, traffic would circle without a choice, in either direction.
+  // Without a diagonal, traffic around a single block could only circle.
   if (nodes_.size() == 4) {
     add_street(0, 3, 1);
     return;
@@ -209,10 +210,11 @@ void Layout::add_diagonals() {
   }
 }
 
-/// Whether the remaining streets connect all nodes; an overpass connects its streets only in pairs.
+/// Whether the remaining streets connect all nodes. At an overpass, streets are connected only with the opposite
+/// street.
 bool Layout::is_connected() const {
-  // Union-find over two halves per node: for an overpass, the eastward and the northward street; other nodes use only
-  // the first half.
+  // Union-find over two elements per node. The elements of an overpass are its eastward and its northward street. Other
+  // nodes use only the first element.
   std::vector<int> parent(2 * nodes_.size());
   std::iota(parent.begin(), parent.end(), 0);
   const auto root = [&](int i) {
@@ -232,8 +234,7 @@ bool Layout::is_connected() const {
   return true;
 }
 
-/// Whether a street may be removed: neither end becomes a dead end, and both ends keep the streets that their kind of
-/// node needs.
+/// Whether a street may be removed: no dead end results, and both nodes keep the streets that their kind needs.
 bool Layout::is_removable(int s) const {
   const Street& street = streets_[s];
   if (street.kind != StreetKind::street || street.direction % 2 == 1) return false;
@@ -283,7 +284,7 @@ void Layout::remove_streets() {
 }
 
 void Layout::choose_street_features() {
-  std::vector<int> all, sides;  // side: twice the street index, plus one for the left side
+  std::vector<int> all, sides;  // a side is twice the street index, plus one for the left side
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
     streets_[s].has_sidewalks = false;
     if (streets_[s].kind == StreetKind::ramp || streets_[s].kind == StreetKind::motorway) continue;

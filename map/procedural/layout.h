@@ -1,5 +1,5 @@
-// Plan of a town: crossings on a jittered grid, the streets between them, and the place of each feature. All random
-// decisions are made here, before any road is built.
+// Layout of a town: crossings on a jittered grid, the streets between them, and the features of each. Layout makes all
+// random decisions, before any road is built.
 #pragma once
 
 #include <vector>
@@ -11,11 +11,11 @@
 namespace pictura::town {
 
 // Dimensions of streets.
-inline constexpr double kMinStreetRadius_m = 30;  // may be smaller next to a fifth arm
+inline constexpr double kMinStreetRadius_m = 30;  // curves may be tighter next to a fifth arm
 inline constexpr double kShoulderWidth_m = 0.5, kSidewalkWidth_m = 2.5, kParkingWidth_m = 2.3, kHalfMedian_m = 1;
 
-/// Eight directions of arms, counter-clockwise from east. Streets of the grid have even directions, diagonals odd
-/// directions.
+/// Eight directions of arms, counter-clockwise from east. Streets of the grid have even directions, and diagonals have
+/// odd directions.
 inline constexpr int kNumDirections = 8;
 inline constexpr int kStepX[kNumDirections] = {1, 1, 0, -1, -1, -1, 0, 1};
 inline constexpr int kStepY[kNumDirections] = {0, 1, 1, 1, 0, -1, -1, -1};
@@ -26,26 +26,25 @@ struct Arm {
   int street = -1;
   int direction = 0;
   bool at_start = false;                            // the street starts here
-  bool has_arrivals = true, has_departures = true;  // whether traffic arrives at the node, and leaves it, on this arm
+  bool has_arrivals = true, has_departures = true;  // whether traffic arrives at the node, or leaves it, on this arm
   double heading = 0;                               // heading of the reference line, away from the node
-  double mouth_m = 0;                               // distance from the node to the street's end
+  double mouth_m = 0;                               // distance from the node to the end of the street
 };
 
-/// Kind of a node. At a fork, a ramp leaves a motorway's outermost lane, and another ramp becomes the outermost lane of
-/// the other direction.
+/// Kind of a node. At a fork, a ramp leaves the outermost lane of a motorway in one direction, and another ramp becomes
+/// its outermost lane in the other direction.
 enum class NodeKind { crossing, roundabout, overpass, fork };
 
-/// Kind of a street. Connectors lead from the town to its motorway. Ramps are one-way, from their first node to their
-/// second.
+/// Kind of a street. Connectors lead from the town to its motorway. Ramps are one-way, from Street::from to Street::to.
 enum class StreetKind { street, avenue, connector, ramp, motorway };
 
 struct Node {
   Eigen::Vector2d position_m{0, 0};
-  double z = 0;        // height of the junction, or of an overpass's lower street
-  double upper_z = 0;  // height of an overpass's upper street
+  double z = 0;        // height of the junction, or of the lower street of an overpass
+  double upper_z = 0;  // height of the upper street of an overpass
   NodeKind kind = NodeKind::crossing;
   bool on_border = false;         // whether the node is on the border of the grid
-  bool upper_runs_north = false;  // direction of an overpass's upper street
+  bool upper_runs_north = false;  // whether the upper street of an overpass runs north, not east
   bool has_lights = false, far_side_heads = false, has_crosswalks = false;
   std::vector<Arm> arms;  // counter-clockwise
 
@@ -55,7 +54,7 @@ struct Node {
   bool is_crossing() const { return kind == NodeKind::crossing && degree() > 2; }
 };
 
-/// A street between two nodes; `leave` and `arrive` are its headings at the two ends.
+/// A street between two nodes. `leave` and `arrive` are its headings at its start and its end.
 struct Street {
   int from = 0, to = 0;
   int direction = 0, end_direction = 0;  // directions of the arms at `from` and at `to`
@@ -66,12 +65,12 @@ struct Street {
   bool parks_left = false, parks_right = false;
   bool slip_at_start = false, slip_at_end = false;  // right-turn lane for traffic that arrives at that end
   double leave = 0, arrive = 0;
-  double start_offset_m = 0, end_offset_m = 0;  // offsets of its ends, to the right of the lines through their nodes
+  double start_offset_m = 0, end_offset_m = 0;  // offsets of its ends to the right
   Curve curve;
   double length_m = 0;
 };
 
-/// Distance of a lane's left border from the street's reference line; lanes count from 0.
+/// Distance of the left border of lane `lane`, counted from 0, from the street's reference line.
 inline double lane_offset_m(const Street& street, int lane) {
   return (street.kind == StreetKind::motorway ? kHalfMedian_m : 0) + lane * street.lane_width_m;
 }
@@ -81,14 +80,14 @@ struct Interchange {
   int entry_fork = -1, overpass = -1, exit_fork = -1;
 };
 
-/// Pose of a street's end at this distance from the node, heading away from the node.
+/// Pose of the end of a street at the distance `mouth_m` from the node, heading away from the node.
 inline Pose mouth_pose(const Node& node, const Arm& arm, const Street& street, double mouth_m) {
   const Pose on_ray = moved_forward({node.position_m, arm.heading}, mouth_m);
   return offset_right(on_ray, arm.at_start ? street.start_offset_m : -street.end_offset_m);
 }
 
-/// Radius of the left border of a right turn into an arm at the angle `gap_rad`. The turn is wide, but close enough to
-/// the corner that no gap in the surface is left between it and the lanes that go straight or cross.
+/// Radius of the left border of a right turn between arms at the angle `gap_rad`. The turn is wide, but so close to the
+/// corner that no gap in the road surface remains between the turn and the other lanes of the junction.
 double right_turn_radius_m(double gap_rad, double lane_width_m);
 
 class Layout {
@@ -100,11 +99,12 @@ class Layout {
   const std::vector<Node>& nodes() const { return nodes_; }
   const std::vector<Street>& streets() const { return streets_; }
 
-  /// Height at the end of a street.
+  /// Returns the height at the start or the end of a street.
   double end_height_m(int street, bool at_start) const;
-  /// Whether traffic arriving on this arm has a separate right-turn lane.
+  /// Whether traffic that arrives on this arm has a separate right-turn lane (slip lane).
   bool has_slip(const Arm& arm) const;
-  /// Maximum number of lanes in one direction over the arms of a node: the number of lanes of a roundabout's circle.
+  /// Returns the maximum number of lanes in one direction over the arms of a node. The circle of a roundabout has this
+  /// number of lanes.
   int max_lanes_of(const Node& node) const;
 
  private:
@@ -155,15 +155,15 @@ class Layout {
   // layout_heights.cpp
   void set_heights();
 
-  /// Random stream of one decision (`purpose`) about one element (`index`).
+  /// Returns the random stream of one decision (`purpose`) about one element (`index`).
   RandomStream draw(uint32_t purpose, int index) const {
     return RandomStream(
         {.seed = options_.seed, .world = static_cast<uint32_t>(index), .episode = purpose, .purpose = Purpose::town});
   }
-  /// Random selection of the given fraction of the candidates: at least one unless the fraction is 0 or there are no
-  /// candidates.
+  /// Selects the given fraction of the candidates at random. Selects at least one candidate, unless the fraction is 0
+  /// or there are none.
   std::vector<int> pick(double fraction, std::vector<int> candidates, uint32_t purpose) const;
-  /// All candidates in random order.
+  /// Returns all candidates in random order.
   std::vector<int> shuffled(std::vector<int> candidates, uint32_t purpose) const;
 
   int node_at(int column, int row) const { return row * (options_.blocks_x + 1) + column; }

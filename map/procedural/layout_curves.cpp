@@ -1,4 +1,5 @@
-// Curves of streets: the headings of arms, the extent of junctions, and the curves between the mouths of streets.
+// Curves of streets: the headings of arms, the extent of junctions, and the curves between junctions. The mouth of a
+// street is its end at a junction.
 #include "pictura/map/procedural/layout.h"
 #include "pictura/map/procedural/movements.h"
 #include "pictura/map/procedural/roundabout_shape.h"
@@ -11,17 +12,18 @@ constexpr double degrees(double angle) { return angle * kPi_rad / 180; }
 
 // Minimum angles between arms: at nodes with grid streets only, between opposite arms, and at nodes with a diagonal.
 constexpr double kMinGap_rad = degrees(72), kMinOppositeGap_rad = degrees(150), kMinFiveArmGap_rad = degrees(62);
-// Angle from which neighbouring arms meet without a corner.
+// Angle above which neighbouring arms meet without a corner.
 constexpr double kFlatGap_rad = degrees(140);
 constexpr double kMinMouth_m = 9, kMinBendMouth_m = 10;
 constexpr double kOverpassMargin_m = 2;
 // Radii of the inner edge of a bend.
 constexpr double kBendRadius_m = 10, kMotorwayBendRadius_m = 90;
-// Distances of a fork's mouths from its node: before the ramps, and after they have left the motorway.
+// Distances from a fork's node to the motorway's mouth before the ramps, and to the mouths where the ramps have left
+// it.
 constexpr double kForkBefore_m = 10, kForkBeyond_m = 40;
 constexpr double kSlipRadius_m = 16;
-// Minimum lengths between the mouths of streets with a slip lane and of streets that a slip lane leads into; and the
-// minimum radius of streets with a slip lane: on the inside of a sharper curve, the lane would open abruptly.
+// Minimum lengths between the mouths of streets with a slip lane, and of streets that a slip lane leads into. Minimum
+// radius of streets with a slip lane, because the lane would open abruptly on the inside of a sharper curve.
 constexpr double kMinSlipStreet_m = 42, kMinSlipExit_m = 25, kMinSlipStreetRadius_m = 60;
 
 double side_width_m(const Street& street) {
@@ -47,7 +49,7 @@ void Layout::set_headings() {
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
     const Node &from = nodes_[streets_[s].from], &to = nodes_[streets_[s].to];
     const Eigen::Vector2d apart = to.position_m - from.position_m;
-    // A ramp runs along its motorway at both ends, in its direction that is one of the grid's.
+    // A ramp is parallel to its motorway at both ends. One of its two directions is that of the motorway, and is even.
     const int along = streets_[s].direction % 2 == 0 ? streets_[s].direction : opposite(streets_[s].end_direction);
     const double heading =
         streets_[s].kind == StreetKind::ramp ? degrees(45.0 * along) : std::atan2(apart.y(), apart.x());
@@ -61,7 +63,7 @@ void Layout::set_headings() {
   }
 }
 
-/// Rotates the arms of a node with a diagonal apart until each pair has the minimum angle.
+/// Rotates the arms of a node with a diagonal until all neighbouring arms have the minimum angle between them.
 void Layout::spread_arms(Node* node) {
   const int count = node->degree();
   const double min_gap = std::min(kMinFiveArmGap_rad, 0.97 * 2 * kPi_rad / count);
@@ -88,7 +90,7 @@ bool Layout::has_close_arms(const Node& node) const {
   return false;
 }
 
-/// Curves streets one by one, as an arc or an S, as far as the neighbouring arms at both ends allow.
+/// Curves streets one by one, into an arc or an S, as far as the neighbouring arms at both ends allow.
 void Layout::curve_streets() {
   std::vector<int> candidates;
   for (int s = 0; s < static_cast<int>(streets_.size()); ++s) {
@@ -117,7 +119,7 @@ void Layout::curve_streets() {
   }
 }
 
-/// Distance from the node to the end of an arm: as far as the corners with its two neighbours require.
+/// Returns the distance from the node to the mouth of an arm. The corners with the two neighbouring arms determine it.
 double Layout::mouth_distance_m(const Node& node, int index) const {
   const Arm& arm = node.arm(index);
   const Street& street = streets_[arm.street];
@@ -151,7 +153,7 @@ double Layout::mouth_distance_m(const Node& node, int index) const {
     const double gap = wrap_to_2pi(left.heading - right.heading);
     if (gap > kFlatGap_rad) continue;
     // Traffic that arrives on the right arm turns right into the left arm. Its path begins on the left border of the
-    // outermost lane of the right arm and ends on that of the left arm.
+    // right arm's outermost lane, and ends on the left border of the left arm's outermost lane.
     const Street &in = streets_[right.street], &out = streets_[left.street];
     const double in_offset = lane_offset_m(in, in.lanes - (has_slip(right) ? 0 : 1));
     const double out_offset = lane_offset_m(out, out.lanes - 1);
@@ -174,7 +176,7 @@ Curve Layout::curve_of(const Street& street) const {
                offset_right(moved_forward({to.position_m, street.arrive}, -mouth(street.to)), street.end_offset_m));
 }
 
-/// Chooses right turns at lights where both streets are long enough for the larger corner.
+/// Chooses slip lanes among the right turns at lights where both streets are long enough for the larger corner.
 void Layout::choose_slip_lanes() {
   struct Turn {
     int node, arm;
@@ -187,7 +189,8 @@ void Layout::choose_slip_lanes() {
         std::any_of(node.arms.begin(), node.arms.end(), [](const Arm& arm) { return arm.direction % 2 == 1; });
     if (!node.is_crossing() || !node.has_lights || has_diagonal || has_ramps(n)) continue;
     for (int i = 0; i < node.degree(); ++i) {
-      // A stem needs its lanes for both directions, and a street that narrows needs its outermost lane for right turns.
+      // The stem of a T needs its lanes for both turns, and a street that narrows needs its outermost lane for right
+      // turns.
       const int straight = straight_on(node, i), lanes = streets_[node.arm(i).street].lanes;
       if (lanes > (straight < 0 ? 1 : streets_[node.arm(straight).street].lanes)) continue;
       if (wrap_to_2pi(node.arm(i + 1).heading - node.arm(i).heading) > degrees(115)) continue;

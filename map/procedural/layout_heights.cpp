@@ -31,8 +31,8 @@ void Layout::set_heights() {
     for (const Wave& wave : waves) sum += std::sin(wave.number.dot(node.position_m) + wave.phase);
     node.z = node.upper_z = options_.hills_m * 0.5 * (1 + sum / kWaves);
   }
-  // Relaxation: repeatedly moves the ends of too steep streets towards each other, and the streets of overpasses apart,
-  // until all constraints hold.
+  // Relaxation: repeats until all constraints hold. Each sweep moves the ends of streets that are too steep towards
+  // each other, and the streets of overpasses apart.
   const auto height = [&](int n, const Street& street) -> double& {
     const bool is_upper =
         nodes_[n].kind == NodeKind::overpass && (street.direction % 4 == 2) == nodes_[n].upper_runs_north;

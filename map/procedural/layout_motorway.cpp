@@ -11,12 +11,12 @@ namespace {
 constexpr double kMotorwayDistance_m = 110;  // from the outermost crossings
 constexpr double kTerminal_m = 45;           // from the motorway to the crossings where its ramps end
 constexpr double kFork_m = 150;              // from the overpass to the forks
-constexpr double kReach_m = 275;             // from the overpass to the bends: a fork, and half of the bend
-constexpr double kGore_m = 1.5;              // between the motorway and a ramp after it has left the motorway
+constexpr double kReach_m = 275;             // from the overpass to the bends, including half of the bend
+constexpr double kGore_m = 1.5;              // between the motorway and a ramp that has left it
 
 Eigen::Vector2d unit(int direction) { return Eigen::Vector2d(kStepX[direction], kStepY[direction]); }
 
-/// Direction of the inner carriageway on this side of the town: clockwise, because traffic keeps right.
+/// Direction of the inner carriageway on this side of the town. It is clockwise, because traffic keeps right.
 constexpr int along(int side) { return (side + 6) % kNumDirections; }
 
 }  // namespace
@@ -36,7 +36,7 @@ void Layout::add_ramp(int from, int to, int direction, int end_direction, int th
   (nodes_[from].kind == NodeKind::fork ? ramp.start_offset_m : ramp.end_offset_m) = offset_m;
 }
 
-/// Adds a diamond interchange: a connector from the town under the motorway, which crosses the ramps of each
+/// Adds a diamond interchange: a connector leads from the town under the motorway, and crosses the ramps of each
 /// carriageway.
 Interchange Layout::add_interchange(int border_node, int side, double motorway_m, int through_lanes) {
   const int forward = along(side), back = opposite(forward);
@@ -61,7 +61,7 @@ Interchange Layout::add_interchange(int border_node, int side, double motorway_m
   connect(border_node, inner, std::min(town_lanes, 2));
   connect(inner, added.overpass, 1);
   connect(added.overpass, outer, 1);
-  // At forks, ramps have the odd directions next to the motorway's.
+  // At forks, ramps have the odd directions next to the motorway's directions.
   const auto turned = [](int direction, int steps) { return (direction + steps) % kNumDirections; };
   add_ramp(added.entry_fork, inner, turned(forward, 7), back, through_lanes);
   add_ramp(inner, added.exit_fork, forward, turned(back, 1), through_lanes);
@@ -70,11 +70,11 @@ Interchange Layout::add_interchange(int border_node, int side, double motorway_m
   return added;
 }
 
-/// Adds interchanges on opposite sides of the town, each behind a crossing that is not a corner of the grid.
+/// Adds interchanges on opposite sides of the town. Each is next to a crossing that is not a corner of the grid.
 void Layout::add_motorway() {
   if (draw(kMotorway, 0).uniform() >= static_cast<float>(options_.motorway)) return;
   constexpr std::array<int, 4> kSides{6, 4, 2, 0};  // clockwise from the south
-  std::array<std::vector<int>, 4> behind;           // crossings of each side
+  std::array<std::vector<int>, 4> behind;           // candidates for crossings next to an interchange
   for (int i = 1; i < options_.blocks_x; ++i) {
     behind[0].push_back(node_at(i, 0));
     behind[2].push_back(node_at(i, options_.blocks_y));
@@ -107,7 +107,8 @@ void Layout::add_motorway() {
     const std::size_t next = (k + 1) % 4;
     corners[k] = add_node(motorway_m[k] * unit(kSides[k]) + motorway_m[next] * unit(kSides[next]));
   }
-  const int through_lanes = 2 + draw(kMotorway, 6).below(2);  // per direction at interchanges; one more between them
+  // Lanes per direction at interchanges. Between interchanges there is one more.
+  const int through_lanes = 2 + draw(kMotorway, 6).below(2);
   const auto build = [&](int from, int to, int side, int lanes) {
     Street& street = add_street(from, to, along(side));
     street.kind = StreetKind::motorway;

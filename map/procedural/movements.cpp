@@ -28,7 +28,8 @@ class Approach {
 
  private:
   int lanes_of(int arm) const { return layout_.streets()[node_.arm(arm).street].lanes; }
-  /// Returns the arm of an exit: exit 1 is on the right, degree - 1 on the left.
+  /// Returns the arm of an exit. Exits count counter-clockwise from the right: exit 1 is on the right, exit degree - 1
+  /// on the left.
   int arm_at(int exit) const { return (arm_ + exit) % node_.degree(); }
   bool may_leave(int arm) const { return node_.arm(arm).has_departures; }
   void add(int to, int first_in, int first_out, int lanes) {
@@ -38,8 +39,8 @@ class Approach {
   /// Whether no traffic goes straight on into this arm, so that only turns use its lanes.
   bool is_stem(int arm) const { return straight_on(node_, arm) < 0; }
 
-  /// Sends all lanes straight on; the innermost also turns left and the outermost right. Paths do not cross; a turn
-  /// into a stem may use any lane on its side of the stem.
+  /// Sends all lanes straight on. The innermost lane also turns left, and the outermost lane also turns right. Paths do
+  /// not cross. A turn into a stem may use any lane on its side of the stem.
   void go_straight(int straight) {
     add(straight, 0, 0, std::min(in_, lanes_of(straight)));
     bool is_left = false;
@@ -58,7 +59,7 @@ class Approach {
     }
   }
 
-  /// Splits the lanes into left and right turns, on the stem of a T or an arm between two others.
+  /// Splits the lanes into left and right turns, for the stem of a T or an arm without an opposite arm.
   void split_left_and_right() {
     const int left = arm_at(node_.degree() - 1), right = arm_at(1);
     const int to_left = std::min(lanes_of(left), num_left(in_));
@@ -73,8 +74,8 @@ class Approach {
     add(right, in_ - to_right, lanes_of(right) - to_right, to_right);
   }
 
-  /// Continues the motorway's lanes that both sides have. An additional lane becomes the ramp on its right. A ramp
-  /// becomes the outermost lane of the arm on its right.
+  /// Continues the lanes that the motorway has on both sides of the fork. An additional lane before the fork becomes
+  /// the ramp on its right. A ramp becomes the outermost lane of the arm on its right.
   void pass_fork(int straight) {
     const int right = arm_at(1);
     if (straight < 0) return add(right, 0, lanes_of(right) - 1, 1);
@@ -83,7 +84,8 @@ class Approach {
     if (in_ > out) add(right, out, 0, 1);
   }
 
-  // The middle lane of a stem serves both turns, lanes inside it only left turns, lanes outside it only right turns.
+  // The middle lane of a stem serves both turns. Lanes on its left serve only left turns, and lanes on its right only
+  // right turns.
   static int num_left(int lanes) { return (lanes + 1) / 2; }
   static int first_right(int lanes) { return num_left(lanes) - 1; }
 

@@ -1,4 +1,4 @@
-// The lane-to-lane movements of a crossing.
+// Movements of a crossing: which lanes continue as which other lanes.
 #pragma once
 
 #include <vector>
@@ -7,15 +7,15 @@
 
 namespace pictura::town {
 
-/// A movement: lanes [first_in, first_in + lanes) of one arm continue as lanes [first_out, ...) of another arm, or the
-/// slip lane continues as the outermost lane.
+/// A movement: lanes [first_in, first_in + lanes) of one arm continue as lanes [first_out, first_out + lanes) of
+/// another arm. If is_slip, the slip lane continues as the outermost lane.
 struct Movement {
   int from = 0, to = 0;  // arms of the node
   int first_in = 0, first_out = 0, lanes = 1;
   bool is_slip = false;
 };
 
-/// Returns the arm into which traffic from `arm` goes straight on; -1: none.
+/// Returns the arm into which traffic from `arm` goes straight on, or -1 if there is none.
 int straight_on(const Node& node, int arm);
 
 /// Returns all movements of a crossing or a fork, grouped by arriving arm. The first movement of each group starts at

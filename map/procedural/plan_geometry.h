@@ -1,4 +1,4 @@
-// Reference lines in plan: lines and arcs from one pose to another, in double.
+// Reference lines in plan (without height): lines and arcs from one pose to another, in double precision.
 #pragma once
 
 #include <algorithm>
@@ -47,7 +47,7 @@ inline opendrive::GeometryPiece piece_of(const Pose& start, double length_m, dou
   return {0, start.position_m.x(), start.position_m.y(), wrap_to_pi(start.heading), length_m, curvature, curvature, {}};
 }
 
-/// Sets the stations of the pieces and returns the curve's length.
+/// Sets the stations (arc lengths from the start) of the pieces, and returns the curve's length.
 inline double assign_stations(Curve* curve) {
   double s = 0;
   for (opendrive::GeometryPiece& piece : *curve) {
@@ -63,7 +63,7 @@ inline double max_curvature(const Curve& curve) {
   return sharpest;
 }
 
-/// Arc (or line) that leaves `from` along its heading and ends at `to_m`.
+/// Returns the arc or line that leaves `from` along its heading and ends at `to_m`.
 inline opendrive::GeometryPiece arc_to(const Pose& from, const Eigen::Vector2d& to_m) {
   const Eigen::Vector2d apart = to_m - from.position_m;
   const double chord = hypot_of(apart.x(), apart.y());
@@ -73,7 +73,8 @@ inline opendrive::GeometryPiece arc_to(const Pose& from, const Eigen::Vector2d& 
   return piece_of(from, chord * half_turn / std::sin(half_turn), 2 * std::sin(half_turn) / chord);
 }
 
-/// Biarc: two arcs with a common tangent and equal control arms; a single piece where one suffices.
+/// Returns a biarc: two arcs with a common tangent and equal control arms. Returns a single piece if both arcs have the
+/// same curvature.
 inline Curve biarc(const Pose& from, const Pose& to) {
   const Eigen::Vector2d leaving = direction_of(from.heading), arriving = direction_of(to.heading);
   const Eigen::Vector2d chord = to.position_m - from.position_m;
@@ -89,10 +90,10 @@ inline Curve biarc(const Pose& from, const Pose& to) {
   return {first, second};
 }
 
-inline constexpr double kNoRadiusLimit_m = 1e9;  // max_radius_m of a fillet without a limit
+inline constexpr double kNoRadiusLimit_m = 1e9;  // value of max_radius_m without a limit
 
-/// Fillet: line, arc and line, tangent to each other, with the largest radius that fits but at most `max_radius_m`. A
-/// biarc if the tangents do not intersect between the poses.
+/// Returns a fillet: a line, an arc and a line, tangent to each other. The radius is as large as fits, but at most
+/// `max_radius_m`. Returns a biarc instead if the tangents at the poses do not intersect between the poses.
 inline Curve fillet(const Pose& from, const Pose& to, double max_radius_m) {
   constexpr double kMinTurn_rad = 0.1, kMinLine_m = 1e-7;
   const double turn = wrap_to_pi(to.heading - from.heading);

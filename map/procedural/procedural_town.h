@@ -1,5 +1,6 @@
-// Generator of a town from a seed, as OpenDRIVE text: streets and avenues on a jittered grid, crossings of three to
-// five arms, roundabouts, overpasses, slip lanes, hills, lights. The text is imported like any other file.
+// Generates a town from a seed, as OpenDRIVE text: streets and avenues on a jittered grid, crossings of three to five
+// arms, roundabouts, overpasses, slip lanes (for right turns), hills and lights. The text is imported like any other
+// OpenDRIVE file.
 #pragma once
 
 #include <string>
@@ -9,7 +10,7 @@
 
 namespace pictura {
 
-/// Returns the .xodr text; equal options give equal bytes. Throws UsageError when an option is out of range.
+/// Returns the OpenDRIVE text. Equal options give equal bytes. Throws UsageError if an option is out of range.
 std::string procedural_town(const TownOptions& options);
 
 }  // namespace pictura

@@ -11,21 +11,21 @@ namespace pictura::town {
 inline constexpr double kCircleLaneWidth_m = 4.5;
 constexpr double circle_radius_m(int lanes) { return lanes == 1 ? 12 : 18; }
 
-/// Radius of the circle's border on which entries end and exits begin. Arms with fewer lanes than the circle use its
-/// outermost lanes.
+/// Radius of the border of the circle's lanes where the left borders of entries end and those of exits begin. An arm
+/// with fewer lanes than the circle uses the circle's outermost lanes.
 constexpr double circle_edge_m(int lanes, int arm_lanes) {
   return circle_radius_m(lanes) + (lanes - arm_lanes) * kCircleLaneWidth_m;
 }
 
-/// Angle between an arm and the end of its entry (or the start of its exit) on the circle, if the next arm on that side
-/// is `gap_rad` away. A piece of the circle remains between the two arms.
+/// Angle between an arm and the end of its entry on the circle, if the next arm on the side of the entry is `gap_rad`
+/// away. The same holds for the start of an exit. A piece of the circle remains between the two arms.
 inline double roundabout_half_angle(double gap_rad) {
   constexpr double kPiece_rad = 16 * std::numbers::pi / 180, kMax_rad = 36 * std::numbers::pi / 180;
   return std::min(0.5 * (gap_rad - kPiece_rad), kMax_rad);
 }
 
-/// Distance from the centre at which an arm must end so that its entry is one arc, tangent to the arm's centre line
-/// and, at this angle, to the circle. `edge_m` is the radius of that point; see circle_edge_m().
+/// Distance from the centre at which an arm must end so that its entry is a single arc. The arc is tangent to the arm's
+/// centre line, and to the circle of radius `edge_m` (circle_edge_m()) at the angle `half_angle_rad` from the arm.
 inline double roundabout_mouth_m(double half_angle_rad, double edge_m) {
   return edge_m / std::cos(half_angle_rad) + edge_m * std::tan(half_angle_rad);
 }

@@ -1,5 +1,5 @@
-// Construction of roundabouts: a one-way circle in pieces, and at each arm a junction of three connecting roads: along
-// the circle, exit and entry.
+// Builds roundabouts: a one-way circle in pieces, and a junction at each arm. Each junction has three connecting roads:
+// one along the circle, the exit and the entry.
 #include "pictura/map/procedural/roundabout_shape.h"
 #include "pictura/map/procedural/town_builder.h"
 
@@ -34,7 +34,7 @@ void TownBuilder::build_roundabout(const Node& node) {
   SectionStyle inside = on_the_circle;
   inside.in_junction = true;
 
-  std::vector<int> pieces;  // pieces of the circle, each after the arm of the same index
+  std::vector<int> pieces;  // pieces of the circle; piece i follows arm i
   for (int i = 0; i < count; ++i) {
     pieces.push_back(add_road(
         circle_piece(node, radius, entry_angle(i), wrap_to_2pi(exit_angle((i + 1) % count) - entry_angle(i))), node.z,

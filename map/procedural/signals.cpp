@@ -10,7 +10,7 @@ namespace pictura::town {
 namespace {
 
 constexpr double kPostSetback_m = 0.8;  // distance of a post from the kerb
-// Near-side heads are on a post beyond the stop line, or on a mast arm over the lanes, high enough for traffic below.
+// Near-side heads are on a post beyond the stop line, or on a mast arm over the lanes that is high enough for traffic.
 constexpr double kNearPost_m = 3, kNearArm_m = 4, kArmRise_m = 2;
 
 struct SignalPosition {
@@ -24,7 +24,8 @@ double behind_kerb_m(const Street& street) {
 
 SignalPosition position_at(const Pose& pose, double z_offset_m = 0) { return {pose.position_m, z_offset_m}; }
 
-/// Returns the position just beyond the stop line: beside a single lane, above several lanes.
+/// Returns a position just beyond the stop line. It is beside the road for a single lane, and above the road for
+/// several lanes.
 SignalPosition near_side(const Pose& arriving, const Street& street, bool has_slip) {
   if (street.lanes == 1 && !has_slip) {
     return position_at(moved_forward(offset_right(arriving, behind_kerb_m(street)), kNearPost_m));
@@ -33,8 +34,7 @@ SignalPosition near_side(const Pose& arriving, const Street& street, bool has_sl
   return position_at(moved_forward(offset_right(arriving, middle_m), kNearArm_m), kArmRise_m);
 }
 
-/// Returns the position beyond the junction, between the arms on both sides of the direction of travel, behind both
-/// kerbs.
+/// Returns a position beyond the junction, behind the kerbs of the two arms on both sides of the direction of travel.
 SignalPosition far_side_between(const Layout& layout, const Node& node, int arm) {
   const double forward = node.arm(arm).heading + kPi_rad;
   double nearest = 0.5 * kPi_rad;
@@ -47,7 +47,8 @@ SignalPosition far_side_between(const Layout& layout, const Node& node, int arm)
   return position_at(moved_forward({node.position_m, forward}, kerb_m / std::sin(nearest)));
 }
 
-/// Road coordinates of a point: its projection onto the reference line and its distance to the left.
+/// Road coordinates of a point: the station `s` of its projection onto the reference line, and its distance `t` to the
+/// left of the line.
 struct RoadPosition {
   double s = 0, t = std::numeric_limits<double>::infinity();
 };

@@ -1,4 +1,4 @@
-// Construction of streets and bends, and of the links between lanes of roads.
+// Builds streets and bends, and the links between the lanes of roads.
 #include "pictura/map/procedural/town_builder.h"
 
 #include <fmt/format.h>

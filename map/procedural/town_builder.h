@@ -1,4 +1,4 @@
-// Construction of a planned town: a Network with roads, lanes, links, junctions, lights and objects.
+// Builds a town from its Layout: a Network with roads, lanes, links, junctions, lights and objects.
 #pragma once
 
 #include <string>
@@ -44,18 +44,19 @@ class TownBuilder {
                   opendrive::FileJunction* junction);
 
   const Street& street_of(const Arm& arm) const { return layout_.streets()[arm.street]; }
-  /// Returns the road end of an arm. The network's first roads are the streets, in their order.
+  /// Returns the road end of an arm. The network's first roads are the streets of the layout, in the same order.
   static RoadEnd end_of(const Arm& arm) { return {arm.street, arm.at_start}; }
   Pose mouth_of(const Node& node, const Arm& arm) const { return mouth_pose(node, arm, street_of(arm), arm.mouth_m); }
 
-  /// Adds a road with one section and returns its index; the left side is ignored for one-way roads.
+  /// Adds a road with one section and returns the road's index. The left side is ignored for one-way roads.
   int add_road(Curve curve, double height_m, const std::string& junction, double speed_mps, const Side& left,
                const Side& right, const SectionStyle& style);
   EndSides& sides_at(RoadEnd end) { return end_sides_[2 * end.road + (end.at_start ? 0 : 1)]; }
-  /// Sides and lane ids at an end, for traffic that arrives there or leaves; id 0: no such lane.
+  /// Returns the side of a road at one of its ends, for traffic that arrives there or leaves.
   const Side& side(RoadEnd end, bool arriving) {
     return arriving == end.at_start ? sides_at(end).left : sides_at(end).right;
   }
+  /// Returns the id of a lane on the side (end, arriving), or 0 if there is no such lane.
   int lane_id(RoadEnd end, bool arriving, LaneKind kind, int index = 0) {
     return side(end, arriving).rank(kind, index) * (arriving == end.at_start ? 1 : -1);
   }
@@ -64,7 +65,7 @@ class TownBuilder {
   void set_junction_link(RoadEnd end, const std::string& junction);
   /// Links two road ends with each other, lane by lane, in both directions.
   void join(RoadEnd a, RoadEnd b);
-  /// Connects lanes that arrive at `from` through the connecting road, which begins there and ends at `to`.
+  /// Connects the movement's lanes at `from` to those at `to` through the road `connecting`, which begins at `from`.
   void connect(RoadEnd from, int connecting, RoadEnd to, const Movement& movement, opendrive::FileJunction* junction);
   void finish_junction(opendrive::FileJunction junction);
 
@@ -74,7 +75,7 @@ class TownBuilder {
   const Layout& layout_;
   opendrive::Network network_;
   std::vector<EndSides> end_sides_;  // [roads][start, end]
-  int next_id_ = 1000000;            // for everything except roads
+  int next_id_ = 1000000;            // next id of elements other than roads
 };
 
 inline constexpr double mph(double speed) { return speed * 0.44704; }

@@ -15,10 +15,10 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the files are little-endian");
 
-// Maximum counts of a scene; beyond them, the next layout is tried.
+// Maximum counts of a scene. If a count is larger, the next layout is tried.
 constexpr int32_t kMaxTracks = kMaxScenarioTracks, kMaxRoads = 1'000'000, kMaxPoints = 1'000'000, kMaxLinks = 10'000;
-constexpr int32_t kMaxGraphLanes = 30'000;  // the matrix has the square of this size
-constexpr int32_t kHistorySteps = 10;       // history of WOMD, the files' source; the files do not contain it
+constexpr int32_t kMaxGraphLanes = 30'000;  // the lane graph's matrix has the square of this size
+constexpr int32_t kHistorySteps = 10;       // steps of history in WOMD, the source of the files; the files lack them
 
 /// Reads numbers in sequence. Throws FieldError at the end of the bytes.
 class Cursor {
@@ -61,7 +61,7 @@ class Cursor {
   std::string_view rest_;
 };
 
-/// Returns a text that is padded with zeros.
+/// Returns the text of a field that is padded with zero bytes.
 std::string text_of(const char* field, std::string_view bytes) {
   std::string text(bytes.substr(0, bytes.find('\0')));
   for (const char letter : text) {
@@ -161,10 +161,10 @@ void read_old_road(Cursor* cursor, bool has_ids, int32_t index, LoggedScene* sce
   if (has_ids) cursor->integer("scenario_id");
   const int32_t type = cursor->integer("type");
   if (type < lane || type > driveway) fail_field("type", "expected 4 to 10, got {}", type);
-  if (has_ids) cursor->integer("id");  // not unique in files of other sources; the index is
+  if (has_ids) cursor->integer("id");  // not unique in some files; the index is used instead
   const int32_t count = cursor->count("n", kMaxPoints);
   LoggedPoints points = read_points(cursor, count);
-  // Fields of agents (width, length, height, goal and mark_as_expert), which have no meaning here.
+  // Skips fields that have a meaning only for agents: width, length, height, goal and mark_as_expert.
   for (int i = 0; i < 6; ++i) cursor->number("width");
   cursor->integer("mark_as_expert");
   switch (type) {
@@ -201,7 +201,7 @@ void read_old(Cursor* cursor, bool is_v2, bool has_name, LoggedScene* scene) {
     within("roads", static_cast<std::size_t>(i), [&] { read_old_road(cursor, is_v2, i, scene); });
   }
   cursor->expect_end();
-  // The index refers to the recording's tracks, some of which the file may lack.
+  // The index refers to the tracks of the recording. The file may lack some of these tracks.
   if (scene->sdc_track >= agents || scene->sdc_track < -1) {
     scene->note("indices of the recording's tracks that are no track of the file left out", "sdc_track_index");
     scene->sdc_track = -1;
@@ -326,7 +326,8 @@ void read_control(Cursor* cursor, int32_t index, LoggedScene* scene) {
   }
 }
 
-/// Reads the optional tails: tagged blocks of PufferDrive, or 123Drive's untagged groups of controls.
+/// Reads the optional blocks at the end of the file: tagged blocks of PufferDrive, or untagged groups of controls of
+/// 123Drive.
 void read_tails(Cursor* cursor, int32_t controls, LoggedScene* scene) {
   constexpr std::size_t kTag_bytes = 8;
   constexpr std::string_view kPhases = "TLPHASE1", kWidths = "LANEWID1";
@@ -385,7 +386,7 @@ void read_new(Cursor* cursor, LoggedScene* scene) {
     if (id < 0 || id >= agents) fail_field("tracks_to_predict", "expected an id in [0, {}), got {}", agents, id);
     scene->predictions.emplace_back(static_cast<int32_t>(id), 0);
   }
-  // Scripts that write no links leave them all empty; meeting ends are then more informative.
+  // Some scripts write only empty links. Then lanes are linked where their ends meet.
   scene->has_links = false;
   for (const LoggedLane& lane : scene->lanes) {
     scene->has_links = scene->has_links || !lane.entries.empty() || !lane.exits.empty();

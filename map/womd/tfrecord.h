@@ -11,16 +11,18 @@
 
 namespace pictura::womd {
 
-/// Bytes with random access: of a file, or in memory.
+/// Source of bytes with random access: a file or a buffer in memory.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
   virtual uint64_t size() const = 0;
-  /// Reads the bytes [offset, offset + count), which must be within size(). Throws Error naming the file.
+  /// Returns the bytes [offset, offset + count), which must be within size(). Throws Error, which names the file, if
+  /// they cannot be read.
   virtual std::string read(uint64_t offset, std::size_t count) const = 0;
 };
 
-/// A regular file. Throws Error naming the path for other kinds of files and for files that cannot be opened.
+/// Bytes of a regular file. The constructor throws Error, which names the path, for other kinds of files and for files
+/// that cannot be opened.
 class FileBytes : public ByteSource {
  public:
   explicit FileBytes(const std::string& path);
@@ -45,13 +47,13 @@ class MemoryBytes : public ByteSource {
   std::string_view bytes_;
 };
 
-/// Place of a record's payload, and its checksum.
+/// Offset, size and checksum of a record's payload.
 struct RecordPlace {
   uint64_t offset = 0, bytes = 0;
   uint32_t sum = 0;
 };
 
-/// Maximum size of a record. Scenes have about 1 MB.
+/// Maximum size of a record. Recorded scenes have about 1 MB.
 constexpr uint64_t kMaxRecord_bytes = uint64_t{1} << 28;
 
 struct RecordList {
@@ -59,11 +61,11 @@ struct RecordList {
   std::string fault;  // reason why the list ends before the end of the file, or empty
 };
 
-/// Lists the records of a file by their lengths, verifying the lengths' checksums. `name` is the file's name in
-/// `fault`.
+/// Lists the records of a file from the records' lengths, and verifies the checksums of the lengths. `name` is the
+/// file's name in RecordList::fault.
 RecordList list_records(const ByteSource& source, const std::string& name);
 
-/// Returns the payload of a record. Throws Error "NAME: record K: ..." unless the payload matches its checksum.
+/// Returns the payload of record `k`. Throws Error "NAME: record K: ..." if the payload does not match its checksum.
 std::string read_record(const ByteSource& source, const std::string& name, std::size_t k, RecordPlace place);
 
 }  // namespace pictura::womd

@@ -1,5 +1,5 @@
-// Reader of protobuf's wire format: the fields of one message, in any order, each bounded by the enclosing message.
-// Knows no schema; skips unknown fields by their wire type.
+// Reader of protobuf's wire format. It reads the fields of one message, in any order, and never beyond the message. It
+// has no schema, and skips unknown fields by their wire type.
 #pragma once
 
 #include <bit>
@@ -14,14 +14,14 @@ namespace pictura::womd {
 
 enum class WireType : uint8_t { varint = 0, fixed64 = 1, bytes = 2, fixed32 = 5 };
 
-/// The fields of a message in sequence. All members throw FieldError if the bytes are not a message: for a length or a
-/// number beyond the end, a varint of more than ten bytes or 64 bits, wire types of groups (3, 4), undefined wire types
-/// (6, 7), or field number 0.
+/// Reads the fields of a message in sequence. All members throw FieldError if the bytes are not a message: if a length
+/// or a number extends beyond the end, a varint has more than ten bytes or 64 bits, a wire type is that of a group (3,
+/// 4) or undefined (6, 7), or a field number is 0.
 class WireReader {
  public:
   explicit WireReader(std::string_view message) : rest_(message) {}
 
-  /// Reads the next field; false at the end of the message.
+  /// Reads the next field. Returns false at the end of the message.
   bool next() {
     if (rest_.empty()) return false;
     take_tag();
@@ -42,8 +42,8 @@ class WireReader {
     return true;
   }
 
-  /// Reads only the length of the next field, whose value may lie beyond these bytes. Returns the lengths of the tag
-  /// (including the length prefix of a bytes field) and of the value.
+  /// Reads only the tag and the length of the next field, whose value may be beyond these bytes. Returns the size of
+  /// the tag (including the length prefix of a bytes field) and the size of the value, in bytes.
   std::pair<std::size_t, uint64_t> next_extent() {
     const std::size_t before = rest_.size();
     take_tag();
@@ -55,30 +55,30 @@ class WireReader {
   uint32_t field() const { return field_; }
   WireType type() const { return type_; }
 
-  // Value of the field. Throws FieldError unless the field has this wire type.
+  // Functions that return the value of the field. They throw FieldError if the field has another wire type.
   std::string_view bytes() const { return expect(WireType::bytes), bytes_; }
   double number64() const { return expect(WireType::fixed64), std::bit_cast<double>(number_); }
   float number32() const { return expect(WireType::fixed32), std::bit_cast<float>(static_cast<uint32_t>(number_)); }
   int64_t integer() const { return expect(WireType::varint), static_cast<int64_t>(number_); }
-  /// Returns an integer's low 32 bits, as protobuf's own readers do for int32 fields.
+  /// Returns the low 32 bits of an integer, as protobuf's own readers do for int32 fields.
   int32_t integer32() const { return static_cast<int32_t>(integer()); }
   bool boolean() const { return integer() != 0; }
 
-  /// Calls visit(value) for a repeated integer, whether packed or not.
+  /// Calls visit(value) for each value of a repeated integer field, packed or not.
   template <typename Visit>
   void integers(Visit&& visit) const {
     if (type_ == WireType::varint) return visit(integer());
     WireReader packed(bytes());
     while (!packed.rest_.empty()) visit(static_cast<int64_t>(packed.take_varint()));
   }
-  /// Calls visit(value) for a repeated double, whether packed or not.
+  /// Calls visit(value) for each value of a repeated double field, packed or not.
   template <typename Visit>
   void numbers64(Visit&& visit) const {
     if (type_ == WireType::fixed64) return visit(number64());
     WireReader packed(bytes());
     while (!packed.rest_.empty()) visit(std::bit_cast<double>(packed.take_number<uint64_t>()));
   }
-  /// Calls visit(value) for a repeated float, whether packed or not.
+  /// Calls visit(value) for each value of a repeated float field, packed or not.
   template <typename Visit>
   void numbers32(Visit&& visit) const {
     if (type_ == WireType::fixed32) return visit(number32());

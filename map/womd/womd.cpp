@@ -45,7 +45,7 @@ class Decoder {
         case 11:
           within("tracks_to_predict", scene_.predictions.size(), [&] { decode_prediction(fields.bytes()); });
           break;
-        default: break;  // lidar and camera tokens, and fields of later versions
+        default: break;  // lidar data, camera tokens, and fields of later versions
       }
     }
     finish();
@@ -115,7 +115,7 @@ class Decoder {
         default: break;
       }
     }
-    if (!state.valid) return;  // contains at most remains of an estimate
+    if (!state.valid) return;  // an invalid state may contain remains of an estimate
     checked_number("center_x", state.center_m.x());
     checked_number("center_y", state.center_m.y());
     checked_number("center_z", state.center_m.z());
@@ -164,7 +164,7 @@ class Decoder {
           state = static_cast<RecordedLightState>(number);
         });
       }
-      // The stop point is that of the lane's start (docs/reference/scenario.md).
+      // The stop point is only checked: the importer uses the start of the lane (docs/reference/scenario.md).
       if (fields.field() == 3) within("stop_point", [&] { decode_point(fields.bytes()); });
     }
     signals_[lane].emplace_back(static_cast<int32_t>(num_signal_steps_), state);
@@ -186,7 +186,7 @@ class Decoder {
   }
 
   void decode_feature(std::string_view bytes) {
-    // The id may come after the part to which it belongs; of several parts, the last counts.
+    // The id may follow the part to which it belongs. If there are several parts, the last counts.
     int64_t id = 0;
     uint32_t kind = 0;
     std::string_view part;
@@ -396,7 +396,8 @@ class Decoder {
   int32_t sdc_index_ = 0;
 };
 
-/// Returns the scenario_id of a record that may be faulty elsewhere, for messages; empty if none is found.
+/// Returns the scenario_id of a record for messages, or an empty string if none is found. Other fields of the record
+/// may be faulty.
 std::string id_in(std::string_view payload) {
   std::string id;
   try {

@@ -1,5 +1,6 @@
-// Waymo Open Motion Dataset: one `Scenario` message (proto2, package waymo.open_dataset) as a scene. Read without
-// protobuf; the field numbers are those of the dataset's scenario.proto and map.proto.
+// Importer of the Waymo Open Motion Dataset (WOMD). It reads one `Scenario` message (proto2, package
+// waymo.open_dataset) as a scene, without protobuf. The field numbers are those of the dataset's scenario.proto and
+// map.proto.
 #pragma once
 
 #include <cstddef>
@@ -13,15 +14,15 @@
 
 namespace pictura::womd {
 
-/// Parses a record's payload; `source` is the record's name in messages ("FILE: record 3"), to which the scenario's id
-/// is added. Accepts fields in any order, and packed and unpacked repeated numbers. Throws Error "SOURCE (scenario ID):
-/// FIELD: ..." for bytes that are not a `Scenario` message, and for points of the map or valid states with numbers that
-/// are not finite. Also throws Error for more or fewer states or signals than timestamps, and for a total of more than
-/// 4 M points and states.
+/// Parses a record's payload. `source` is the record's name in messages ("FILE: record 3"); the scenario's id is added
+/// to it. Accepts fields in any order, and packed and unpacked repeated numbers. Throws Error "SOURCE (scenario ID):
+/// FIELD: ..." in these cases: the bytes are not a `Scenario` message; a point of the map or a valid state has a number
+/// that is not finite; the number of states or signals differs from that of timestamps; there are more than 4 million
+/// points and states in total.
 LoggedScene parse_scenario(std::string_view payload, const std::string& source);
 
-/// Returns the scenario_id of a record, reading only a small part of it; empty if there is none. Throws FieldError for
-/// bytes that are not a message.
+/// Returns the scenario_id of a record, or an empty string if it has none. Reads only a small part of the record.
+/// Throws FieldError if the bytes are not a message.
 std::string scan_scenario_id(const ByteSource& source, RecordPlace place);
 
 }  // namespace pictura::womd
