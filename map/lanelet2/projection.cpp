@@ -81,8 +81,8 @@ std::optional<MgrsPlace> parse_mgrs(std::string_view code) {
   place.zone = {number, band < kBandN};
   place.square_m.x_m = (easting + 1) * kSquare_m;
   const double in_cycle_m = ((row + (number % 2 == 0 ? kRows - 5 : 0)) % kRows) * kSquare_m;
-  // Of the squares with this row letter, the code means the square that overlaps the band. Bands are 8 degrees high,
-  // but the northernmost is 12 degrees high.
+  // The code means the square with this row letter that overlaps the band. Bands are 8 degrees high, but the
+  // northernmost is 12 degrees high.
   const double south_deg = 8.0 * (band - kBandN), north_deg = south_deg + (band == kBandX ? 12 : 8);
   const double meridian_deg = central_meridian_deg(place.zone);
   const double low_m = to_utm({south_deg, meridian_deg}, place.zone).y_m - kSquare_m;

@@ -1,5 +1,5 @@
-// Stages that turn a Network into a RoadMap, in the order of execution in parse_opendrive. Each stage fills its own
-// vectors of the map and may read vectors of earlier stages.
+// Stages that turn a Network into a RoadMap, in the order in which parse_opendrive() runs them. Each stage fills its
+// own vectors of the map and may read vectors of earlier stages.
 #pragma once
 
 #include <vector>
@@ -42,20 +42,20 @@ struct Build {
 
   /// Converts file coordinates to map coordinates.
   Vec3 to_map(const Eigen::Vector3d& p) const { return to_vec3(from_origin(p)); }
-  /// Coordinates relative to the map's origin, before rounding.
+  /// Converts file coordinates to coordinates relative to the map's origin, without rounding to float.
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const {
     return p - Eigen::Vector3d{map->origin_m[0], map->origin_m[1], map->origin_m[2]};
   }
 };
 
-/// Whether traffic on a side, given by the sign of its lane ids, travels towards growing s. In right-hand traffic this
-/// is the right side of the reference line.
+/// Whether traffic on a side of the road travels towards growing s. The sign of `side` is that of the side's lane ids.
+/// In right-hand traffic, this is true on the right side of the reference line.
 constexpr bool travels_forward(const FileRoad& road, int side) { return (side < 0) != road.left_hand; }
 inline bool travels_forward(const FileRoad& road, const FileLane& lane) {
   return travels_forward(road, lane.id) != (lane.direction == LaneDirection::reversed);
 }
 
-/// Sets the map origin: the centre of the reference lines, in whole metres.
+/// Sets the map's origin to the centre of the reference lines, in whole metres.
 void choose_origin(Build* build);
 
 /// Returns the provenance of an element on road `road` of the network.
@@ -63,7 +63,8 @@ inline SourceElement source_of(std::size_t road, const SourceLocation& where) {
   return {static_cast<int32_t>(road), where.line()};
 }
 
-/// Builds lanes of every type except "none": centre lines and neighbours, links, and speed limits.
+/// These three stages build lanes of every type except "none": centre lines and neighbours, then links, then speed
+/// limits.
 void build_lanes(Build* build);
 void link_lanes(Build* build);
 void set_speed_limits(Build* build);

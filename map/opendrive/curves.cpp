@@ -11,14 +11,14 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Margin inside a section to which stations are clamped, so that cubics that begin at its ends are evaluated on the
-// section's own side.
+// Stations are clamped to this distance inside a section. So at a section's end, the cubics of this section are
+// evaluated, not those of the adjacent section.
 constexpr double kSectionMargin_m = 1e-5;
-// Maximum turn of an integration panel of a spiral; five Gauss points are then exact up to rounding.
+// Maximum turn of an integration panel of a spiral. Up to this turn, five Gauss points are exact except for rounding.
 constexpr double kPanelTurn_rad = 0.5;
 
 struct GaussPoint {
-  double position, weight;  // on [0, 1]
+  double position, weight;  // position and weight on [0, 1]
 };
 constexpr GaussPoint kGauss[5] = {{0.046910077030668004, 0.11846344252809454},
                                   {0.23076534494715845, 0.23931433524968324},
@@ -90,7 +90,7 @@ double parameter_at(const PlaneCubic& cubic, double fraction) {
 /// Converts a point in the frame of the piece's start to file coordinates.
 Eigen::Vector2d in_file(const GeometryPiece& piece, const Eigen::Vector2d& p) {
   const double c = std::cos(piece.heading), s = std::sin(piece.heading);
-  // The sum is evaluated from left to right; another order would change the bits of maps.
+  // The sum is evaluated from left to right, because another order would change the bits of imported maps.
   return Eigen::Vector2d{piece.x, piece.y} + p.x() * Eigen::Vector2d{c, s} + p.y() * Eigen::Vector2d{-s, c};
 }
 
@@ -119,7 +119,7 @@ bool has_banking(const FileRoad& road) {
            road.right_crossfall.cubics.empty() && road.shape.empty());
 }
 
-/// Returns `t`, clamped to the inner border of the first `level` lane on that side.
+/// Returns `t`, clamped to the inner border of the first lane on its side that has the attribute `level`.
 double banked_t(const FileRoad& road, double s, double t) {
   const FileSection& section = last_item_at(road.sections, s);
   for (const FileLane& lane : t > 0 ? section.left : section.right) {
@@ -136,7 +136,7 @@ double spiral_turn(const GeometryPiece& piece, double ds) {
   return ds * (piece.start_curvature + 0.5 * rate * ds);
 }
 
-/// Displacement between two positions on a spiral within one panel, in the frame of the spiral's start.
+/// Returns the displacement between two positions on a spiral within one panel, in the frame of the spiral's start.
 Eigen::Vector2d spiral_step(const GeometryPiece& piece, double from, double to) {
   Eigen::Vector2d sum{0, 0};
   for (const GaussPoint& gauss : kGauss) {
@@ -165,7 +165,7 @@ Pose pose_on(const GeometryPiece& piece, double ds, LastDirection* last) {
   return {in_file(piece, in_frame), piece.heading + spiral_turn(piece, ds), k0 + rate * ds};
 }
 
-/// Shift of a deformed road at s, and the shift's first two derivatives by s.
+/// Shift of a deformed road at s, and the first two derivatives of the shift with respect to s.
 struct Shift {
   Eigen::Vector2d value_m{0, 0}, slope{0, 0}, bend{0, 0};
 };
@@ -221,13 +221,13 @@ Eigen::Vector3d point_beside(const FileRoad& road, const Station& station, doubl
   return {p.x(), p.y(), z};
 }
 
-/// Bounds of a cubic and its derivatives over an interval.
+/// Bounds of a cubic over an interval: the range of its value, and the maximum magnitudes of its first and second
+/// derivatives (slope and bend).
 struct Bounds {
-  double low = 0, high = 0, slope = 0,
-         bend = 0;  // low, high: range of the value; slope, bend: maximum magnitudes of its derivatives
+  double low = 0, high = 0, slope = 0, bend = 0;
 };
 
-/// Computes bounds from Bernstein coefficients, which bound a polynomial.
+/// Computes the bounds from Bernstein coefficients, because these bound a polynomial.
 Bounds bounds_between(const Profile& profile, double begin, double end) {
   if (profile.cubics.empty()) return {};
   const Cubic& cubic = last_item_at(profile.cubics, 0.5 * (begin + end));
@@ -246,10 +246,10 @@ Bounds bounds_between(const Profile& profile, double begin, double end) {
   return bounds;
 }
 
-/// Returns an upper bound, between two breaks, of the second derivative by s of points on a lane, its borders, and up
-/// to `beyond_m` outside them. A point is c + t n, with the reference line c, its normal n, its curvature k, and the
-/// lateral position t. Its second derivative has the components k't + 2kt' along the line and k(1 - kt) + t'' across
-/// it.
+/// Returns an upper bound of the second derivative of positions with respect to s, between two breaks. The bound holds
+/// for points on a lane and up to `beyond_m` outside its borders. A point is c + t n, where c is the reference line
+/// with normal n and curvature k, and t is the lateral position. The second derivative has the components k't + 2kt'
+/// along the line and k(1 - kt) + t'' across it.
 double bend_between(const FileRoad& road, const FileSection& section, int lane, double beyond_m, double begin,
                     double end) {
   constexpr double kUnknown = std::numeric_limits<double>::infinity();
@@ -257,8 +257,8 @@ double bend_between(const FileRoad& road, const FileSection& section, int lane, 
   const GeometryPiece& piece = last_item_at(road.geometry, 0.5 * (begin + end));
   if (piece.cubic || road.deformation || end <= begin) return kUnknown;
   const Bounds offset = bounds_between(road.lane_offset, begin, end);
-  double near = 0, far = 0, slope = offset.slope,
-         bend = offset.bend;  // near, far: distances of the lane's borders from lane 0
+  // near, far: distances of the lane's borders from lane 0.
+  double near = 0, far = 0, slope = offset.slope, bend = offset.bend;
   const std::vector<FileLane>& side = lane > 0 ? section.left : section.right;
   for (std::size_t i = 0; i < static_cast<std::size_t>(std::abs(lane)); ++i) {
     if (!side[i].border.cubics.empty()) return kUnknown;
@@ -354,7 +354,7 @@ const Station& StationCache::at(const FileRoad& road, double s) {
     road_ = &road;
     stations_.assign(std::size_t{1} << kLogSize, {.s = std::numeric_limits<double>::quiet_NaN()});
   }
-  constexpr std::uint64_t kMultiplier = 0x9e3779b97f4a7c15;  // multiplier of Fibonacci hashing
+  constexpr std::uint64_t kMultiplier = 0x9e3779b97f4a7c15;  // Fibonacci hashing
   Station& station = stations_[(std::bit_cast<std::uint64_t>(s) * kMultiplier) >> (64 - kLogSize)];
   if (station.s != s) station = station_at(road, s, &direction_);
   return station;
@@ -394,8 +394,8 @@ double heading_between(const FileRoad& road, const FileSection& section, int inn
   const double lateral = t * std::cos(roll);
   const double lateral_slope = slope * std::cos(roll) - t * std::sin(roll) * road.superelevation.slope(s);
   const Pose pose = pose_at(road, s);
-  // A lateral slope turns the line away from the reference line, more so on the inside of a curve. Slopes are
-  // derivatives of the formulae instead of differences, since files have steps between cubics.
+  // A lateral slope turns the line away from the reference line, and turns it more on the inside of a curve. Slopes are
+  // derivatives of the cubics, not differences, because files have steps between cubics.
   return pose.heading + std::atan2(lateral_slope, pose.stretch * (1.0 - pose.curvature * lateral));
 }
 

@@ -13,7 +13,8 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Maximum distance between reference lines at linked ends. Ends that are farther apart get equal shifts.
+// Maximum distance between reference lines at linked ends for which the shifts of the ends differ. Ends that are
+// farther apart get equal shifts.
 constexpr double kMaxLinkOffset_m = 40.0;
 
 /// Ends of roads, numbered 2 * road + (0: start, 1: end), in groups of linked ends.
@@ -67,9 +68,9 @@ class ShiftSolver {
     }
   }
 
-  /// Returns the shifts [ends].
+  /// Returns the shifts, as [ends].
   std::vector<Eigen::Vector2d> solve() {
-    // Roads outside junctions keep the first shift that they get, however short they are, and linked roads follow.
+    // A road outside junctions keeps the first shift that it gets. Then the roads that are linked with it get theirs.
     for (std::size_t road = 0; road < network_.roads.size(); ++road) {
       if (is_in_junction(2 * road)) continue;
       for (const std::size_t end : {2 * road, 2 * road + 1}) set_shift(end, Eigen::Vector2d::Zero());
@@ -81,8 +82,7 @@ class ShiftSolver {
         }
       }
     }
-    // The remaining groups have only ends of roads within junctions. The first end of each of these groups is not
-    // shifted.
+    // The remaining groups contain only ends of junction roads. The first end of each of these groups is not shifted.
     for (std::size_t end = 0; end < ends_.size(); ++end) take_members(end);
     std::vector<Eigen::Vector2d> all;
     for (std::size_t end = 0; end < ends_.size(); ++end) {
@@ -94,8 +94,7 @@ class ShiftSolver {
  private:
   bool is_in_junction(std::size_t end) const { return !network_.roads[end / 2].junction.empty(); }
 
-  /// Sets the shift of an end, and of the road's other end if the other end has no shift. Does nothing if `end` has a
-  /// shift.
+  /// Sets the shift of an end, and of the road's other end if that has no shift yet. Does nothing if `end` has a shift.
   void set_shift(std::size_t end, const Eigen::Vector2d& shift_m) {
     for (const std::size_t each : {end, end ^ 1}) {
       if (shifts_[each]) return;
@@ -104,15 +103,15 @@ class ShiftSolver {
     }
   }
 
-  /// Returns the members of an end's group and makes the end the group's anchor. For later ends of the same group,
-  /// returns an empty list.
+  /// Returns the members of an end's group, and makes the end the group's anchor. Returns an empty list if the group
+  /// already has an anchor.
   std::vector<std::size_t> take_members(std::size_t end) {
     const std::size_t group = ends_.group_of(end);
     anchors_.try_emplace(group, end);
     return std::exchange(members_[group], {});
   }
 
-  /// Returns the shift by which `end` keeps its distance in metres to the left of `anchor`.
+  /// Returns the shift with which `end` keeps its lateral distance in metres from `anchor`.
   Eigen::Vector2d shift_beside(std::size_t anchor, std::size_t end) const {
     const Pose& pose = poses_[anchor];
     const Eigen::Vector2d along{std::cos(pose.heading), std::sin(pose.heading)}, left{-along.y(), along.x()};
@@ -130,7 +129,7 @@ class ShiftSolver {
   std::vector<std::optional<Eigen::Vector2d>> shifts_;    // [ends]
   std::unordered_map<std::size_t, std::size_t> anchors_;  // by group
   std::vector<Pose> poses_;                               // [ends] in the network before the deformation
-  std::vector<std::size_t> reached_;                      // ends with new shifts, whose groups are not yet shifted
+  std::vector<std::size_t> reached_;                      // ends with shifts whose groups are not yet shifted
 };
 
 }  // namespace

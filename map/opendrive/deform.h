@@ -5,12 +5,12 @@
 
 namespace pictura::opendrive {
 
-/// Maps a network by `plan`; stations, lateral positions, heights and speed limits do not change. The plan maps
-/// reference lines. Lateral positions t are measured from the mapped reference line, perpendicular to it, so widths in
-/// metres do not change. If the reference lines of linked roads do not meet, as in junctions, roads are shifted so that
-/// their lanes still meet. The shift at such a link is the distance between the two lines times the plan's change of
-/// scale across them. Roads outside junctions are shifted as a whole if their links allow it; along other roads, the
-/// shift changes smoothly from end to end.
+/// Deforms a network by `plan`, which transforms the reference lines. Stations s, lateral positions t, heights and
+/// speed limits do not change. Because t is measured perpendicular to the transformed reference line, widths in metres
+/// do not change. The reference lines of linked roads may not meet, for example in junctions. Such roads are shifted so
+/// that their lanes still meet. The shift at a link is the distance between the two reference lines times the plan's
+/// change of scale across them. A road outside junctions is shifted as a whole if its links allow it. Along other
+/// roads, the shift changes smoothly from end to end.
 void deform(const PlanMap& plan, Network* network);
 
 }  // namespace pictura::opendrive

@@ -9,9 +9,9 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr int kMaxDepth = 64;
-constexpr std::size_t kMaxAttribute_bytes = std::size_t{1} << 12;  // copied with every object and mark
+constexpr std::size_t kMaxAttribute_bytes = std::size_t{1} << 12;  // attributes are copied with each object and mark
 
-/// Returns the length of the UTF-8 sequence at the beginning of `text`, 0 if it is invalid.
+/// Returns the length of the UTF-8 sequence at the beginning of `text`, or 0 if it is invalid.
 std::size_t sequence_length(std::string_view text) {
   const unsigned char lead = static_cast<unsigned char>(text[0]);
   if (lead < 0x80) return 1;
@@ -34,7 +34,7 @@ void check_characters(std::string_view text, const Source& source) {
   }
 }
 
-/// Visits every node once; neither this class nor the parser recurses, at any depth of nesting.
+/// Checks every node. Neither this class nor the parser recurses, so deep nesting cannot overflow the call stack.
 class ShapeCheck : public pugi::xml_tree_walker {
  public:
   explicit ShapeCheck(const Source& source) : source_(source) {}

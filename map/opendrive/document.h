@@ -1,4 +1,4 @@
-// Parsing of an OpenDRIVE file's XML, with rejection of unsafe documents.
+// Parses the XML of an OpenDRIVE file, and rejects unsafe documents.
 #pragma once
 
 #include <string_view>
@@ -10,8 +10,8 @@
 
 namespace pictura::opendrive {
 
-/// Parses `text`. Throws Error naming source and line unless the text is well-formed UTF-8 XML without a document type,
-/// nested at most 64 deep, with attributes of at most 64 KiB.
+/// Parses `text`. Throws Error, which names source and line, if the text is not well-formed UTF-8 XML, has a document
+/// type or an <include>, is nested more than 64 deep, or has an attribute of more than 4 KiB.
 void read_document(std::string_view text, const Source& source, pugi::xml_document* document_out);
 
 }  // namespace pictura::opendrive

@@ -9,13 +9,13 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Tolerance of negative widths, which count as 0. If a lane tapers off, rounding by writers makes widths slightly
-// negative.
+// Negative widths up to this magnitude count as 0 and are not recorded. They occur where a lane tapers off, because
+// writers round numbers.
 constexpr double kWidthTolerance_m = 0.01;
 constexpr double kMaxWidth_m = 500;
 constexpr double kMaxBanking_rad = 1.4;
-// Between stations all quantities are cubics of s. The values of a cubic at five points bound the cubic within a small
-// factor.
+// Number of probes between two stations, between which all quantities are cubics of s. The values at both ends and at
+// the probes bound a cubic up to a small factor.
 constexpr int kProbes = 4;
 
 template <typename Probe>
@@ -25,7 +25,7 @@ void at_probes(const std::vector<double>& stations, Probe&& probe) {
   }
 }
 
-/// Checks widths. Negative widths count as zero, which is recorded once per lane.
+/// Checks the widths of a lane. Records the repair of negative widths once per lane.
 void check_widths(const FileRoad& road, const FileSection& section, const FileLane& lane, Faults* faults) {
   bool is_recorded = false;
   at_probes(formula_changes(road, section, lane.id, section.s, section.end), [&](double s) {

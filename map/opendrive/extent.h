@@ -7,8 +7,8 @@
 
 namespace pictura::opendrive {
 
-/// Throws Error unless offsets, heights and banking are within limits along the whole road. Repaired: negative widths,
-/// which all readers count as zero.
+/// Throws Error if an offset, height, banking or width exceeds its limit anywhere along the road. Repair: negative
+/// widths count as zero.
 void check_extent(const FileRoad& road, Faults* faults);
 
 }  // namespace pictura::opendrive

@@ -19,7 +19,7 @@ void count_facts(Build* build) {
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     const Lane& lane = map.lanes[i];
     const auto [section, file_lane] = build->file_lanes[i];
-    // Pieces of a lane that was cut at changes of its speed limit are one lane of the file.
+    // Some lanes are cut where their speed limit changes. The pieces count as one lane, as in the file.
     const bool is_counted = !file_lane->is_continued && lane.length_m >= kShortestLane_m;
     facts.lanes += is_counted;
     if (lane.type != LaneType::driving) continue;

@@ -1,4 +1,5 @@
-// Faults of a file that have one sensible meaning. Such faults are repaired and recorded, or refused in strict reading.
+// Faults of a file that have only one sensible meaning. Such faults are repaired and recorded. Strict reading refuses
+// them.
 #pragma once
 
 #include <string>
@@ -14,8 +15,8 @@ class Faults {
  public:
   explicit Faults(bool strict) : strict_(strict) {}
 
-  /// Records a fault that the caller repairs by action_of(kind). In strict reading, throws Error with its message
-  /// instead.
+  /// Records a fault, which the caller then repairs by action_of(kind). In strict reading, throws Error with the
+  /// fault's message instead.
   void record_repair(Repair repair, const std::string& source) {
     if (strict_) throw Error(message_of(repair, source));
     // The limit bounds memory.

@@ -1,4 +1,4 @@
-// Construction of lanes from sections: centre lines in the direction of travel, and neighbours.
+// Builds lanes from sections: centre lines in the direction of travel, and neighbours.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -10,7 +10,7 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Maximum distance from the origin; within it, float coordinates have a resolution of 8 mm.
+// Maximum distance from the origin. Up to this distance, float coordinates have a resolution of 8 mm.
 constexpr double kMaxMapRadius_m = 1e5;
 
 Lane make_lane(Build* build, const FileRoad& road, const FileSection& section, const FileLane& lane) {

@@ -28,7 +28,7 @@ std::unordered_set<std::string> controlled_signals(const Network& network) {
   return signals;
 }
 
-/// Whether a signal at s applies to a driving lane, and no lane to which it applies leads to a junction on its road.
+/// Whether a signal applies to a driving lane of its road, but to no driving lane that leads to a junction.
 template <typename Signal>
 bool is_away_from_junctions(const FileRoad& road, const Signal& signal) {
   if (!road.junction.empty()) return false;
@@ -45,14 +45,14 @@ bool is_away_from_junctions(const FileRoad& road, const Signal& signal) {
   return has_lane;
 }
 
-/// Station of a head, and the place of its stop line.
+/// Station of a head, and the variable that receives the station of its stop line.
 struct Head {
   double s = 0;
   Orientation orientation = Orientation::either;
   std::optional<double>* stop_s = nullptr;
 };
 
-/// Sets the stop line of each head. Heads within 20 m share the line at the head that traffic meets first.
+/// Sets the stop line of each head. Heads within 20 m share the stop line of the head that traffic reaches first.
 void find_lines(bool forward, std::vector<Head>* heads) {
   std::sort(heads->begin(), heads->end(),
             [forward](const Head& a, const Head& b) { return forward ? a.s < b.s : a.s > b.s; });

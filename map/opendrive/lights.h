@@ -10,12 +10,14 @@ namespace pictura::opendrive {
 /// Type of signals that are traffic lights.
 inline constexpr std::string_view kLightType = "1000001";
 
-/// Whether a signal or reference applies to a lane of its road: by its validity if given, else by its orientation.
+/// Whether a signal or signal reference applies to a lane of its road. Its validity decides if it has one, else its
+/// orientation.
 bool applies_to(const FileLane& lane, const FileRoad& road, Orientation orientation,
                 const std::vector<LaneRange>& validity);
 
-/// Splits sections at the stop lines of lights that no controller controls and whose lanes lead to no junction. Heads
-/// of one orientation within 20 m share a stop line, which is at the head that traffic reaches first.
+/// Splits sections at the stop lines of some lights: no controller controls the light, and its lanes do not lead to a
+/// junction. Heads of one orientation within 20 m share a stop line. The stop line is at the head that traffic reaches
+/// first.
 void split_at_lights(Network* network);
 
 }  // namespace pictura::opendrive

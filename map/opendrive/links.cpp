@@ -1,4 +1,4 @@
-// Links of lanes: from the lanes' own links, across the links of their roads, and from the connections of junctions.
+// Links lanes according to their own links, the links of their roads, and the connections of junctions.
 #include <algorithm>
 #include <set>
 
@@ -10,11 +10,11 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Maximum gap between linked lanes, whatever the file contains (Town03 links two neighbouring lanes to the same next
-// lane).
+// Maximum gap between linked lanes. Links of the file with larger gaps are omitted; for example, Town03 links two
+// neighbouring lanes to one next lane.
 constexpr float kMaxLinkGap_m = 1.0f;
 
-/// One end of a lane: its start or end by s of its road.
+/// One end of a lane. Start and end refer to the direction of s, not of traffic.
 struct LaneEnd {
   int road = 0, section = 0, id = 0;
   ContactPoint end = ContactPoint::start;
@@ -95,7 +95,7 @@ class Linker {
   }
 
   /// Links two lanes that meet, in the order in which traffic passes them. Links that traffic cannot follow are omitted
-  /// and counted; links between sidewalks and similar lanes are omitted without being counted.
+  /// and recorded as repairs, except links between lanes that are not drivable, such as sidewalks.
   void add(const LaneEnd& a, const LaneEnd& b, const SourceLocation& where) {
     const int32_t lane_a = lane_at(a), lane_b = lane_at(b);
     if (lane_a < 0 || lane_b < 0) return;

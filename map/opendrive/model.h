@@ -19,7 +19,7 @@
 
 namespace pictura::opendrive {
 
-/// Name and line index of the file; converts an element's byte offset to a line, counted from 1.
+/// Name and line index of the file. Converts the byte offset of an element to its line, counted from 1.
 class Source {
  public:
   Source() = default;
@@ -49,7 +49,7 @@ struct SourceLocation {
     fail_with(fmt::format(format, std::forward<Args>(args)...));
   }
 
-  /// Records a fault that the caller repairs, or throws; see Faults.
+  /// Records a fault that the caller repairs, or throws Error in strict reading; see Faults.
   void record_repair_with(Faults* faults, RepairKind kind, const std::string& message) const;
 
   template <typename... Args>
@@ -58,7 +58,7 @@ struct SourceLocation {
   }
 };
 
-/// The cubic a + b ds + c ds^2 + d ds^3 at a station s' >= s, with ds = s' - s.
+/// The cubic a + b ds + c ds^2 + d ds^3. At a station s' >= s, ds is s' - s.
 struct Cubic {
   double s = 0, a = 0, b = 0, c = 0, d = 0;
 };
@@ -71,26 +71,26 @@ struct Profile {
   double slope(double s) const;
 };
 
-/// A parametric cubic (u(p), v(p)), p from 0 to p_end, in the frame of its start; <poly3> is the case u = p.
+/// A parametric cubic (u(p), v(p)) in the frame of its start, for p from 0 to p_end. A <poly3> has u = p.
 struct PlaneCubic {
   std::array<double, 4> u{}, v{};  // coefficients of p^0 to p^3
   double p_end = 0;
   std::array<double, 17> arc_length{};  // arc length from the start to p = p_end * i / 16; see measure() in curves.h
 };
 
-/// A piece of a reference line: a cubic, or a curve whose curvature changes linearly from start to end. Lines have
-/// curvatures of 0, arcs equal curvatures at both ends.
+/// A piece of a reference line. It is a cubic, or a curve whose curvature changes linearly from start to end. Lines
+/// have curvature 0, and arcs have equal curvatures at both ends.
 struct GeometryPiece {
   double s = 0, x = 0, y = 0, heading = 0, length = 0;
   double start_curvature = 0, end_curvature = 0;
   std::optional<PlaneCubic> cubic;
-  // Spirals only: start of each integration panel, in the frame of the piece's start; see measure() in curves.h.
+  // Start of each integration panel, in the frame of the piece's start; only for spirals. See measure() in curves.h.
   std::vector<std::array<double, 2>> panels;
 };
 
 /// One stripe of a mark, read from a <line> element.
 struct MarkLine {
-  double length = 0, space = 0;  // lengths of a dash and of the following gap; explicit lines have no gap
+  double length = 0, space = 0;  // lengths of a dash and of the gap after it; explicit lines have no gap
   double t_offset = 0;           // offset of the stripe's centre line to the left of the lane's border
   double s_offset = 0;           // start of the first dash, from the start of the mark
   double width = 0;              // 0: use the mark's width
@@ -100,23 +100,23 @@ struct MarkLine {
 enum class LaneChange : uint8_t { both, increase, decrease, none };
 
 struct RoadMark {
-  double s_offset = 0;  // from the section's s; negative on continued lanes
+  double s_offset = 0;  // start relative to the section's s; negative on continued lanes
   std::string type;     // "none", "solid", "broken solid", ...
   bool bold = false;
   MarkColor color = MarkColor::white;
-  double width = 0;                           // 0: not given
+  double width = 0;                           // 0: the file gives no width
   LaneChange lane_change = LaneChange::both;  // permitted directions of lane changes across the mark
-  std::vector<MarkLine> lines;                // repeated along the mark, instead of the pattern of `type`
+  std::vector<MarkLine> lines;                // repeated along the mark; replace the pattern of `type`
   std::vector<MarkLine> explicit_lines;       // painted once each
-  Profile sway;  // lateral shift of the lines to the left, as a function of s minus the mark's start
+  Profile sway;  // shift of the lines to the left, as a function of s minus the mark's start
   SourceLocation where;
 };
 
-/// Direction of traffic relative to the road's rule: same, opposite or both ways.
+/// Direction of traffic relative to the road's rule (right-hand or left-hand traffic): same, opposite or both.
 enum class LaneDirection : uint8_t { standard, reversed, both };
 
 struct FileLane {
-  int id = 0;  // positive left of the reference line, negative right; 0: the line itself
+  int id = 0;  // positive on the left of the reference line, negative on the right, 0 for the centre lane
   std::string type_name;
   LaneType type = LaneType::other;
   int section = 0;            // index of the file's <laneSection> in the road, from 0
@@ -127,9 +127,9 @@ struct FileLane {
   std::vector<int> predecessors, successors;
   // Functions of s minus the section's s.
   Profile width;
-  Profile border;  // used if the lane has no widths: t of the outer border, relative to the reference line
-  Profile inner_height, outer_height;  // piecewise constant; height above the road at the lane's borders
-  Profile speed_limit_mps;             // constant; 0: no limit
+  Profile border;                      // t of the outer border from the reference line; used if the lane has no widths
+  Profile inner_height, outer_height;  // heights of the borders above the road; piecewise constant
+  Profile speed_limit_mps;             // piecewise constant; 0: no limit
   std::vector<RoadMark> marks;         // on the outer border, in ascending order of s_offset
   SourceLocation where;
 };
@@ -154,7 +154,7 @@ struct RoadLink {
   SourceLocation where;     // also set for a link that was omitted
 };
 
-/// Traffic to which a signal applies: along s ("+"), against s ("-"), or either.
+/// Direction of the traffic to which a signal applies: along s ("+"), against s ("-"), or either.
 enum class Orientation : uint8_t { along, against, either };
 
 struct LaneRange {
@@ -171,7 +171,8 @@ struct FileSignal {
   SourceLocation where;
 };
 
-/// Reference in a road to a signal of any road; it makes the signal apply to lanes of the reference's road.
+/// Reference in a road to a signal of any road. The signal then applies to lanes of the road that contains the
+/// reference.
 struct SignalReference {
   std::string signal;
   double s = 0, t = 0;
@@ -181,7 +182,7 @@ struct SignalReference {
   SourceLocation where;
 };
 
-/// An object. The corners of its outline are (u, v) in the object's frame; with along_road they are (s, t) of the road.
+/// An object. The corners of its outline are (u, v) in the object's frame, or (s, t) of the road if along_road is set.
 struct FileObject {
   enum class Kind : uint8_t { crosswalk, parking_space, stop_line } kind = Kind::crosswalk;
   std::string id, name;
@@ -194,14 +195,14 @@ struct FileObject {
   SourceLocation where;
 };
 
-/// Heights above the banked road at one s, as a function of t.
+/// Height of the surface above the banked road at one s, as a function of t.
 struct CrossSection {
   double s = 0;
   Profile height;
 };
 
-/// Deformation of a road's points in a copy of its map; see deform.h. The shift of the reference line changes from
-/// start to end as a smoothstep of s, so that headings at both ends are those of the mapped line.
+/// Deformation of a road's points in an affine copy of its map; see deform.h. The shift of the reference line changes
+/// from start to end as a smoothstep of s. So the shift does not change the headings at both ends.
 struct RoadDeformation {
   PlanMap plan;
   std::array<double, 2> start_shift_m{}, end_shift_m{};
@@ -212,13 +213,13 @@ struct FileRoad {
   double length = 0;
   bool left_hand = false;  // left-hand traffic
   RoadLink predecessor, successor;
-  Profile speed_limit_mps;  // constant; 0: no limit
+  Profile speed_limit_mps;  // piecewise constant; 0: no limit
   std::vector<GeometryPiece> geometry;
   std::optional<RoadDeformation> deformation;  // if set, s is a parameter instead of an arc length
   Profile elevation, lane_offset;
   Profile superelevation;                   // rad, rotation about the reference line; positive: left side up
   Profile left_crossfall, right_crossfall;  // rad, slope of each side; positive: down from the reference line
-  std::vector<CrossSection> shape;          // in ascending order of s; interpolated linearly between them
+  std::vector<CrossSection> shape;          // in ascending order of s; heights between them are interpolated
   std::vector<FileSection> sections;
   std::vector<FileObject> objects;
   std::vector<FileSignal> signals;
@@ -232,7 +233,7 @@ struct LaneLink {
 };
 
 struct Connection {
-  std::string incoming_road, connecting_road;       // in direct junctions, connecting_road is the linked road
+  std::string incoming_road, connecting_road;       // in direct junctions, connecting_road is the linked road itself
   ContactPoint contact = ContactPoint::start;       // end of the connecting road at the incoming road
   bool has_contact = true;                          // false: missing in the file and determined by repair_links()
   ContactPoint incoming_end = ContactPoint::start;  // end of the incoming road at the junction; set by repair_links()

@@ -13,17 +13,19 @@ namespace pictura {
 
 struct OpenDriveOptions {
   float chord_error_m = 0.02f;  // maximum distance between a sampled curve and the exact curve
-  bool strict = false;          // refuse every fault, including faults with one sensible meaning
-  // Plan of a copy whose lanes keep their widths. It must not mirror, nor change any length by more than half.
+  bool strict = false;          // refuse also faults that could be repaired
+  // Linear transformation of the ground plane for an affine copy, whose lanes keep their widths. The plan must not
+  // mirror, and must not change any length by more than half.
   PlanMap plan;
 };
 
-/// Callback before each stage of an import, with the stage's name and the share of the work that is done.
+/// Callback that an importer calls before each stage, with the stage's name and the share of the work that is done.
 using ImportProgress = std::function<void(const char* stage, double done)>;
 
-/// Parses the text of an OpenDRIVE file. `source` is its name in messages. Faults that have one sensible meaning are
-/// repaired and recorded in `RoadMap::mends`. Throws Error naming source, line, owner and element for all other faults,
-/// and in strict reading for any fault. docs/reference/opendrive_conformance.md lists the faults.
+/// Parses the text of an OpenDRIVE file. `source` is the file's name in messages. Faults that have only one sensible
+/// meaning are repaired and recorded in `RoadMap::mends`. Throws Error, which names source, line, owner and element,
+/// for all other faults, and with options.strict for any fault. docs/reference/opendrive_conformance.md lists the
+/// faults.
 RoadMap parse_opendrive(std::string_view text, const std::string& source, const OpenDriveOptions& options = {},
                         const ImportProgress& progress = {});
 

@@ -1,4 +1,4 @@
-// Paint of an OpenDRIVE network: lane marks, crosswalks, stop lines, parking spaces.
+// Builds the paint of an OpenDRIVE network: lane marks, crosswalks, stop lines and parking spaces.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -17,7 +17,7 @@ constexpr double kMinMarkLength_m = 0.05;
 // Botts' dots: 4 inches wide, one every 48 inches.
 constexpr double kDot_m = 0.1016, kDotPeriod_m = 1.2192;
 
-// Distance within which corners are merged.
+// Maximum distance of corners that are merged.
 constexpr float kSamePoint_m = 1e-3f;
 
 /// One stripe of a mark, `left` metres from the border. Dashes begin at origin + i * period along the road; with
@@ -32,7 +32,7 @@ struct Stripe {
 };
 
 /// Returns the stripes of a mark's type. The two stripes of a double line are one width apart. The first word of the
-/// type is the stripe nearer to the centre lane, which is on the left on the right side of the road.
+/// type describes the stripe nearer to the centre lane. On the right side of the road, this is the left stripe.
 std::vector<Stripe> stripes_of_type(const RoadMark& mark, int lane_id) {
   const double width = mark.width > 0 ? mark.width : mark.bold ? kBoldMarkWidth_m : kDefaultMarkWidth_m;
   const double inner = lane_id > 0 ? -width : width;
@@ -91,7 +91,7 @@ class MarkPainter {
       }
       const double last = stripe.once ? 0 : std::floor((end - stripe.origin) / stripe.period);
       for (double i = stripe.once ? 0 : std::floor((begin - stripe.origin) / stripe.period); i <= last; ++i) {
-        build_.budget.count_sample();  // including dashes that are too short to be painted
+        build_.budget.count_sample();  // also for dashes that are too short to be painted
         const double dash_begin = stripe.origin + i * stripe.period;
         add(mark, stripe, std::max(dash_begin, begin), std::min(dash_begin + stripe.dash, end));
       }
@@ -117,8 +117,8 @@ class MarkPainter {
             p.z() = point_on_lane(road_, section_, lane_, s, 1, &build_.stations).z();
           return CurvePoint{s, p, 0};
         });
-    // On the inner side of a bend whose radius is smaller than the mark's offset, a mark would run backwards and cross
-    // itself.
+    // Omits the parts of a mark that would run backwards. A mark runs backwards on the inside of a bend if its offset
+    // exceeds the bend's radius.
     std::size_t begin = 0;
     for (std::size_t i = 1; i < points.size(); ++i) {
       if (!runs_back(points[i - 1], points[i])) continue;
@@ -159,7 +159,7 @@ class MarkPainter {
   const FileRoad& road_;
   const FileSection& section_;
   const FileLane& lane_;
-  bool is_recorded_ = false;  // whether the self-crossing of the mark is recorded
+  bool is_recorded_ = false;  // whether the repair of the current mark is recorded
 };
 
 /// Returns the corners of an object: its outline, or its bounding box.
@@ -207,8 +207,8 @@ void add_crosswalk(Build* build, std::size_t road, const FileObject& object) {
   map.provenance.crosswalks.push_back(source_of(road, object.where));
 }
 
-/// Adds a stop line along the longer extent of the corners. The shorter extent is the line's width, in the middle of
-/// which the line runs.
+/// Adds a stop line along the longer extent of the corners, in the middle of the shorter extent. The shorter extent is
+/// the line's width.
 void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
   constexpr std::size_t kMaxCorners = 64;
   const std::vector<Vec3> corners = corners_of(build, build->network.roads[road], object);
@@ -254,7 +254,8 @@ void add_stop_line(Build* build, std::size_t road, const FileObject& object) {
   build->map->provenance.stop_lines.push_back(source_of(road, object.where));
 }
 
-/// Metres of a deformed road per metre in a direction, given as an angle from the road's heading.
+/// Returns the stretch of a deformed road in a direction: deformed metres per original metre. `angle` is the direction
+/// relative to the road's heading.
 double stretch_towards(const Pose& pose, double angle) {
   return hypot_of(pose.stretch * std::cos(angle), std::sin(angle));
 }
@@ -279,12 +280,12 @@ void add_parking_space(Build* build, std::size_t road_index, const FileObject& o
     length_m *= stretch_towards(pose, object.heading);
     width_m *= stretch_towards(pose, object.heading + 0.5 * std::numbers::pi);
   }
-  // Cars park along the longer side, whichever dimension the file calls length.
+  // Cars park along the longer side, even if the file calls it width.
   if (width_m > length_m) {
     std::swap(width_m, length_m);
     heading += 0.5 * std::numbers::pi;
   }
-  // The space's heading is the one of two opposite headings that is closer to the traffic on this side of the road.
+  // The space gets that of the two opposite headings which is closer to the traffic on this side of the road.
   const bool forward = travels_forward(road, object.t > 0 ? 1 : -1);
   const double traffic = pose.heading + (forward ? 0.0 : std::numbers::pi);
   if (std::cos(heading - traffic) < 0) heading += std::numbers::pi;

@@ -1,4 +1,4 @@
-// Reader of reference lines: <geometry> in plan, elevation and banking.
+// Reads reference lines: <geometry> in plan, elevation and banking.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,12 +19,13 @@ constexpr double kMaxCoordinate_m = 1e8, kMaxHeading_rad = 1e3;
 constexpr double kMaxTurn_rad = 100.0;  // maximum turn of a geometry: 16 full turns, enough for a helix
 constexpr double kMaxGap_m = 0.1;  // maximum gap between two geometries, and maximum error of a reference line's length
 constexpr double kMaxLengthError = 0.01;  // relative error of a <paramPoly3>'s length, in addition to kMaxGap_m
-constexpr double kMaxJump_m = 5.0;        // maximum jump that is repaired; larger gaps have no single meaning
-constexpr double kMaxStep_m = 0.5;        // maximum step of the elevation; a larger one would be a wall to cars
-constexpr std::size_t kMaxJumps = 1000;   // maximum number per road; bounds the time of smoothing
-// Maximum turn at a geometry shorter than kStationTolerance_m; beyond it, the heading of the geometry has no meaning.
+constexpr double kMaxJump_m = 5.0;        // maximum jump that is repaired; larger jumps have no sensible meaning
+constexpr double kMaxStep_m = 0.5;        // maximum step of the elevation; a larger step would be a wall for cars
+constexpr std::size_t kMaxJumps = 1000;   // maximum number of jumps per road; bounds the time of smoothing
+// Maximum turn at a geometry that is shorter than kStationTolerance_m. If the turn is larger, the heading of the
+// geometry has no meaning.
 constexpr double kMaxKink_rad = 0.2;
-// Maximum error of a length, absolute or as a share, that is repaired by cutting or extending.
+// Maximum error of a length, in metres or as a share of the length, that is repaired by cutting or extending.
 constexpr double kMaxCut_m = 0.5, kMaxCutShare = 0.01;
 
 bool can_cut(double error_m, double length_m) {
@@ -47,7 +48,7 @@ std::array<double, 4> coefficients(const Element& element, const char* suffix) {
   return result;
 }
 
-/// Reads a cubic v of u; u ends where the arc length equals the length of the piece.
+/// Reads a cubic v(u). u ends where the arc length equals the length of the piece.
 PlaneCubic read_poly3(const Element& element, double length) {
   PlaneCubic cubic{.u = {0, 1, 0, 0}, .v = coefficients(element, "")};
   double low = 0, high = length;
@@ -119,9 +120,9 @@ double distance_m(const GeometryPiece& before, const GeometryPiece& piece) {
   return (Eigen::Vector2d{piece.x, piece.y} - pose_on(before, before.length).position_m).norm();
 }
 
-/// Makes a geometry begin at the station at which the previous one ends. The previous geometry is cut or extended if
-/// the error is small, or if this does not increase the gap between them. Otherwise the geometry is moved along s.
-/// Returns the distance of this move.
+/// Makes a geometry begin at the station where the previous geometry ends. Cuts or extends the previous geometry if the
+/// error is small, or if this does not increase the gap between the two geometries. Otherwise moves the geometry along
+/// s. Returns the distance of the move.
 double join_stations(const Geometry& geometry, GeometryPiece* before, GeometryPiece* piece) {
   const double end = before->s + before->length, error = piece->s - end;
   if (std::abs(error) <= kStationTolerance_m) return 0;
@@ -191,7 +192,7 @@ void drop_kinks(std::vector<Geometry>* geometries) {
 /// Joins the geometries into the reference line. Its length becomes the road's length, even if the file gives another
 /// length.
 void join_geometry(const std::vector<Geometry>& geometries, FileRoad* road) {
-  double moved = 0;  // sum of the moves so far
+  double moved = 0;  // sum of the moves along s
   for (const Geometry& geometry : geometries) {
     GeometryPiece piece = geometry.piece;
     piece.s += moved;
@@ -222,7 +223,8 @@ void join_geometry(const std::vector<Geometry>& geometries, FileRoad* road) {
   if (!jumps.empty()) spread_jumps(jumps, road);
 }
 
-/// Reads the elevation: cubics of s that join, up to the end of the file's description.
+/// Reads the elevation, and smooths jumps between its cubics. Jumps beyond `described`, where the file's description of
+/// the road ends, are ignored.
 void read_elevation(const Element& profile, double described, FileRoad* road) {
   road->elevation = read_profile(profile, "elevation", "s", road->length);
   const std::vector<Cubic>& cubics = road->elevation.cubics;
@@ -255,7 +257,7 @@ bool is_zero(const Profile& profile) {
                      [](const Cubic& c) { return c.a == 0 && c.b == 0 && c.c == 0 && c.d == 0; });
 }
 
-/// Reads cubics of t at stations s: one cross-section per s.
+/// Reads the cross-sections. The cubics of t with the same station s make one cross-section.
 std::vector<CrossSection> read_shape(const Element& lateral, double road_length) {
   struct Shape {
     double s = 0;
@@ -285,7 +287,8 @@ std::vector<CrossSection> read_shape(const Element& lateral, double road_length)
   return sections;
 }
 
-/// Reads superelevation, crossfall (1.4) and shape. Profiles that are zero everywhere, as most are, are dropped.
+/// Reads superelevation, crossfall (of OpenDRIVE 1.4) and shape. Drops profiles that are zero everywhere, which most
+/// are.
 void read_banking(const Element& lateral, FileRoad* road) {
   if (!lateral) return;
   if (const Element strips = lateral.child("crossSectionSurface")) {

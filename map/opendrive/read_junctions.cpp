@@ -1,12 +1,12 @@
-// Reader of the connections of roads: links, junctions, and the controllers of traffic lights.
+// Reads the connections of roads (links and junctions), and the controllers of traffic lights.
 #include "pictura/map/opendrive/read_parts.h"
 
 namespace pictura::opendrive {
 
 namespace {
 
-/// Sets the end to which a link or connection refers. A missing or unknown end is recorded, and repair_links()
-/// determines it.
+/// Sets the end of the road to which a link or connection refers. Records a missing or unknown end, which
+/// repair_links() determines.
 template <typename Link>
 void read_contact(const Element& element, Link* link) {
   const std::string text = element.text("contactPoint", "");
@@ -69,7 +69,7 @@ FileJunction read_junction(const Element& element) {
   const std::string type = element.text("type", "default");
   junction.is_direct = type == "direct";
   if (type != "default" && !junction.is_direct) {
-    // Kept without connections, since roads refer to the junction.
+    // The junction is kept without connections, because roads refer to it.
     element.record_repair(RepairKind::unsupported_junction,
                           "attribute type: '{}' junctions are not supported; expected default or direct", type);
     return junction;

@@ -1,4 +1,4 @@
-// Reader of lane sections: lanes with their widths, links and road marks.
+// Reads lane sections: lanes with their widths, links and road marks.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -11,8 +11,8 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Minimum length of a section. Editors leave shorter sections behind when snapping; these are removed, because lanes
-// cannot be built from them.
+// Minimum length of a section. Editors create shorter sections when they snap roads together. These are removed,
+// because lanes cannot be built from them.
 constexpr double kMinSection_m = 1e-3;
 constexpr double kMaxLaneWidth_m = 1e3, kMaxLaneHeight_m = 100;
 constexpr int kMaxLanesPerSide = 64;
@@ -60,7 +60,8 @@ LaneType lane_type(const Element& element, const std::string& name) {
   return LaneType::other;
 }
 
-/// Visits records of constants, each valid from its sOffset on: calls read(element, s) in the order of the file.
+/// Calls read(element, s) for the records `name` of a lane, in the order of the file. Each record contains constants
+/// that apply from its station s (sOffset) on.
 template <typename Read>
 void each_record(const Element& lane, const char* name, double section_length, Read&& read) {
   lane.each(name, [&](const Element& element) {
@@ -101,8 +102,8 @@ LaneDirection read_direction(const Element& element) {
   return LaneDirection::standard;
 }
 
-/// Reads a lane's type. A centre lane has no surface, whatever its type; a lane without a type attribute is a special
-/// lane.
+/// Reads a lane's type. A lane without a type attribute has no surface if it is a centre lane, and is a special lane
+/// otherwise.
 void read_type(const Element& element, bool is_center, FileLane* lane) {
   lane->type_name = element.text("type", is_center ? "none" : "special1");
   if (!element.has("type")) element.record_repair(RepairKind::missing_lane_type, "attribute type is missing");
@@ -166,7 +167,7 @@ FileLane read_center_lane(const Element& element, double section_length) {
   return lane;
 }
 
-/// Inserts lanes without surface for missing ids between the sorted lanes of a side.
+/// Inserts lanes without surface for the ids that are missing between the sorted lanes of a side.
 void fill_gaps(int sign, std::vector<FileLane>* lanes) {
   std::vector<FileLane> filled;
   for (FileLane& lane : *lanes) {
@@ -208,8 +209,8 @@ void read_side(const Element& section, const char* side, int sign, double sectio
   if (std::abs(before) != static_cast<int>(lanes_out->size())) fill_gaps(sign, lanes_out);
 }
 
-/// A <laneSection> element and its start on the road. A section that starts beyond the road's end is moved to the end,
-/// so that it has no length and read_lanes() bridges it.
+/// A <laneSection> element and its start on the road. A section that starts beyond the road's end is moved to the end.
+/// So it has no length, and read_lanes() removes it.
 struct SectionElement {
   double s = 0;
   Element element;
@@ -276,7 +277,7 @@ void read_lanes(const Element& road_element, Faults* faults, FileRoad* road) {
     const FileSection& section = road->sections[i];
     const double length = section.end - section.s;
     if (road->sections.size() == 1 || length >= kMinSection_m) continue;
-    if (section.s < road->length) {  // sections beyond the end are already recorded
+    if (section.s < road->length) {  // sections beyond the road's end are already recorded
       section.where.record_repair(faults, RepairKind::short_section, "is {} m long; expected at least {}", length,
                                   kMinSection_m);
     }

@@ -1,4 +1,4 @@
-// Reader of road marks: type, colour, width, and explicitly listed lines.
+// Reads road marks: type, colour, width, and explicit lines.
 #include <cmath>
 #include <unordered_map>
 #include <unordered_set>
@@ -47,7 +47,8 @@ void check_type(const Element& element, const std::string& type) {
   }
 }
 
-/// Appends the line of `element`. Lines without length and gaps are continuous, as several writers intend.
+/// Appends the line of `element`. A line without length and without gaps is continuous, because several writers mean
+/// this.
 void read_line(const Element& element, bool is_explicit, std::vector<MarkLine>* lines_out) {
   MarkLine line;
   line.length = element.number_or_zero_in("length", 0, kMaxRoadLength_m);

@@ -1,4 +1,4 @@
-// Reader of objects (crosswalks, parking spaces, stop lines), signals and signal references.
+// Reads objects (crosswalks, parking spaces, stop lines), signals and signal references.
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -12,7 +12,7 @@ namespace {
 
 // Maximum distance of objects before the start or after the end of their road.
 constexpr double kMaxOverhang_m = 10;
-// Minimum distance between the copies of a <repeat>; a smaller distance means one continuous object.
+// Minimum distance between the copies of a <repeat>. A smaller distance means one continuous object.
 constexpr double kMinRepeat_m = 0.1;
 constexpr std::size_t kMaxCopies = 10'000;
 constexpr std::size_t kMaxCopiedCorners = 1'000'000;
@@ -24,8 +24,8 @@ bool contains_word(std::string text, std::string_view word) {
   return text.find(word) != std::string::npos;
 }
 
-/// Returns the kind of an object if RoadMap stores it, else nullopt. OpenDRIVE has no object type for stop lines; files
-/// contain them as road marks of the subtype signalLines, or as objects called stop line.
+/// Returns the kind of an object if RoadMap stores such objects, else nullopt. OpenDRIVE has no object type for stop
+/// lines. Files contain them as road marks of the subtype signalLines, or as objects with the name stop line.
 std::optional<FileObject::Kind> kind_of(const Element& element) {
   const std::string type = element.text("type", "none");
   if (type == "crosswalk") return FileObject::Kind::crosswalk;
@@ -38,7 +38,7 @@ std::optional<FileObject::Kind> kind_of(const Element& element) {
   return std::nullopt;
 }
 
-/// Whether an object or signal lies beside its road. If not, the fault is repaired by omitting it.
+/// Whether an object or signal is beside its road. If not, records the repair: the caller omits it.
 bool is_near_road(const Element& element, double road_length) {
   const double low_s = -kMaxOverhang_m, high_s = road_length + kMaxOverhang_m;
   const double s = element.number("s"), t = element.number_or_zero("t");
@@ -63,7 +63,7 @@ double read_height(const Element& element, const char* attribute) {
   return element.number_in(attribute, -kMaxHeight_m, kMaxHeight_m, 0);
 }
 
-/// Returns the outer one of an object's outlines; the other outlines are holes in the object or parts of it.
+/// Returns the outer outline of an object. Its other outlines are holes in the object or parts of it.
 Element outer_outline(const Element& element) {
   Element outline = element.child("outline");
   if (const Element outlines = element.child("outlines"); !outline && outlines) {
@@ -74,7 +74,7 @@ Element outer_outline(const Element& element) {
   return outline;
 }
 
-/// Reads an outline; returns nullopt if a corner lies far from the road.
+/// Reads an outline. Returns nullopt if a corner is far from the road.
 std::optional<std::vector<FileObject::Corner>> read_outline(const Element& element, double road_length) {
   std::vector<FileObject::Corner> corners;
   bool is_near = true;
@@ -91,7 +91,7 @@ std::optional<std::vector<FileObject::Corner>> read_outline(const Element& eleme
   return corners;
 }
 
-/// Reads an object; returns nullopt if it lies far from its road.
+/// Reads an object. Returns nullopt if the object is far from its road.
 std::optional<FileObject> read_object(const Element& element, FileObject::Kind kind, double road_length) {
   FileObject object;
   object.where = element.where();
@@ -111,7 +111,7 @@ std::optional<FileObject> read_object(const Element& element, FileObject::Kind k
   return object;
 }
 
-/// Whether the copies of a <repeat> can be made. If not, the fault is repaired by placing the object once.
+/// Whether the copies of a <repeat> can be made. If not, records the repair: the caller places the object once.
 bool can_repeat(const Element& repeat, const FileObject& object) {
   const double distance = repeat.number_in("distance", 0, kMaxRoadLength_m);
   if (distance < kMinRepeat_m) {

@@ -17,9 +17,9 @@ namespace pictura::opendrive {
 
 namespace {
 
-constexpr double kMaxSpeed = 1000;  // in the unit of the file
+constexpr double kMaxSpeed = 1000;  // maximum speed limit, in the unit of the file
 
-/// Transform of all coordinates in the header: a rotation about the origin, then a translation.
+/// The header's transform of all coordinates: a rotation about the origin, then a translation.
 struct Offset {
   double x = 0, y = 0, z = 0, heading = 0;
 };
@@ -54,7 +54,7 @@ bool is_left_hand(const Element& road_element) {
   return rule == "LHT";
 }
 
-/// Reads the speed limits of <type>, each of which applies from its s on.
+/// Reads the speed limits of a road's <type> elements. Each applies from its s on.
 Profile read_road_speed_limits(const Element& road_element, double road_length) {
   Profile limits;
   road_element.each("type", [&](const Element& type) {

@@ -1,4 +1,4 @@
-// Reader from the text of an OpenDRIVE file to a Network.
+// Reads the text of an OpenDRIVE file into a Network.
 #pragma once
 
 #include "pictura/common/error_types.h"
@@ -7,9 +7,9 @@
 
 namespace pictura::opendrive {
 
-/// Parses and checks `text`, which must outlive `network_out`, and applies the header's offset. Throws Error naming
-/// source, line, owner and element for malformed, missing, out-of-range or unsupported input without a sensible
-/// meaning; other faults are repaired.
+/// Parses and checks `text`, and applies the header's offset. `text` must outlive `network_out`. Throws Error, which
+/// names source, line, owner and element, for malformed, missing, out-of-range or unsupported input without a sensible
+/// meaning. Other faults are repaired.
 void read_network(std::string_view text, const std::string& source_name, Faults* faults, Network* network_out);
 
 }  // namespace pictura::opendrive

@@ -10,8 +10,8 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Maximum distance at which road ends count as touching. It is used to repair links, never to remove links that both
-// roads state.
+// Maximum distance at which road ends count as touching. It is used to repair links. A link that both roads contain is
+// never removed because of its distance.
 constexpr double kTouch_m = 1.0;
 
 const char* name_of(ContactPoint end) { return end == ContactPoint::start ? "start" : "end"; }
@@ -28,13 +28,14 @@ RoadLink* link_at(FileRoad* road, ContactPoint end) {
   return end == ContactPoint::start ? &road->predecessor : &road->successor;
 }
 
-/// Removes a road's link except for its location, which tells lanes that a link existed.
+/// Removes a road's link, but keeps its location. The location shows to later checks of lane links that the file has a
+/// link.
 void clear_link(RoadLink* link) {
   link->kind = RoadLink::Kind::none;
   link->id.clear();
 }
 
-/// Position where the lanes of a road begin or end: its reference line, moved by the lane offset.
+/// Returns the position where the lanes of a road begin or end: on its reference line, moved by the lane offset.
 Eigen::Vector3d position_of(const FileRoad& road, ContactPoint end) {
   const FileSection& section = end == ContactPoint::start ? road.sections.front() : road.sections.back();
   const double s = end == ContactPoint::start ? 0 : road.length;
@@ -45,7 +46,8 @@ double distance_m(const FileRoad& a, ContactPoint end_a, const FileRoad& b, Cont
   return (position_of(a, end_a) - position_of(b, end_b)).norm();
 }
 
-/// Returns the end of `b` that touches the given end of `a`; `contact` if both ends or neither end of `b` touch it.
+/// Returns the end of `b` that touches the given end of `a`. If both ends or neither end of `b` touch it, returns
+/// `contact`.
 ContactPoint touching_end(const FileRoad& a, ContactPoint end, const FileRoad& b, ContactPoint contact) {
   const bool touches = distance_m(a, end, b, contact) <= kTouch_m;
   return !touches && distance_m(a, end, b, other_end(contact)) <= kTouch_m ? other_end(contact) : contact;
@@ -108,8 +110,8 @@ class LinkRepairer {
     }
   }
 
-  /// Checks that a link between two roads is mutual. If the other road's end refers to a third road, geometry decides
-  /// whether the link is kept.
+  /// Checks that a link between two roads is mutual. If the linked end of the other road is linked to a third road, the
+  /// link is kept only if the two ends touch.
   void check_return(FileRoad* road, ContactPoint end) {
     RoadLink* const link = link_at(road, end);
     if (link->kind != RoadLink::Kind::road) return;
@@ -137,8 +139,9 @@ class LinkRepairer {
     if (!touches) clear_link(link);
   }
 
-  /// Finds both ends of a connection: by the connecting road's link, else by the incoming road's link to the junction,
-  /// else by geometry. Returns false if the roads do not meet; the fault is repaired by omitting the connection.
+  /// Finds the ends where the two roads of a connection meet: from the connecting road's link, else from the incoming
+  /// road's link to the junction, else from geometry. If the roads do not meet, records the repair (the caller omits
+  /// the connection) and returns false.
   bool find_ends(const FileJunction& junction, Connection* connection) {
     const FileRoad* const incoming = road_named(connection->incoming_road);
     const FileRoad* const connecting = road_named(connection->connecting_road);

@@ -1,5 +1,5 @@
-// Checks of links between roads and junctions in a whole file. Links whose meaning follows from geometry or from the
-// other side are repaired, so that later stages can follow every link.
+// Checks the links between roads and junctions of a whole file, and repairs links whose meaning follows from geometry
+// or from the linked road. Later stages can therefore follow every link.
 #pragma once
 
 #include "pictura/map/opendrive/faults.h"
@@ -7,8 +7,8 @@
 
 namespace pictura::opendrive {
 
-/// Repairs links as RepairKind describes. Afterwards every road link, every road's junction and both roads of every
-/// connection exist, contact points are known, and Connection::incoming_end is set.
+/// Repairs links as RepairKind describes. Afterwards the targets of all road links, the junctions of all roads and both
+/// roads of all connections exist. Contact points are known, and Connection::incoming_end is set.
 void repair_links(Network* network, Faults* faults);
 
 }  // namespace pictura::opendrive

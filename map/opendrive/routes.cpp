@@ -1,4 +1,4 @@
-// Derivation of inherited speed limits from the lane graph.
+// Sets speed limits of lanes. Lanes without a limit inherit limits along the lane graph.
 #include <map>
 
 #include "pictura/map/opendrive/build.h"
@@ -11,14 +11,14 @@ void set_speed_limits(Build* build) {
   for (Lane& lane : map.lanes) {
     const FileRoad& road = build->network.roads[lane.source_road];
     const auto [section, file_lane] = build->file_lanes[&lane - map.lanes.data()];
-    // Sections are cut where a limit changes, so the limit at the middle applies throughout. The lane's own limit has
-    // precedence.
+    // The limit at the middle applies to the whole section, because sections are cut where a limit changes. The lane's
+    // own limit has precedence over the road's.
     const double middle = 0.5 * (section->s + section->end);
     const double own_mps = file_lane->speed_limit_mps.value(middle - section->s);
     lane.speed_limit_mps = static_cast<float>(own_mps > 0 ? own_mps : road.speed_limit_mps.value(middle));
   }
-  // Lanes without a limit, such as those of junctions, inherit the highest limit of their predecessors, else of their
-  // successors, across any number of lanes.
+  // Lanes without a limit, such as junction lanes, inherit the highest limit of their predecessors, across any number
+  // of lanes. If no predecessor has a limit, they inherit from successors in the same way.
   auto inherit = [&](IndexRange Lane::* onward) {
     std::vector<int32_t> frontier;
     for (std::size_t i = 0; i < map.lanes.size(); ++i) {

@@ -53,12 +53,12 @@ std::vector<double> speed_changes(const FileRoad& road, const FileSection& secti
   return changes;
 }
 
-/// Replaces links of a section's lanes to an adjacent section, which is removed, by the links of that section's lanes
-/// beyond it.
+/// Replaces the links of a section's lanes to the lanes of an adjacent section, which is removed. The new links lead to
+/// the lanes to which the removed lanes were linked.
 void link_across(const FileSection& removed, std::vector<int> FileLane::* links, FileSection* section) {
   for (std::vector<FileLane>* side : {&section->left, &section->right}) {
     for (FileLane& lane : *side) {
-      // Targets are made unique, since repeated links would double with every removed section.
+      // Targets are unique, because repeated links would double with every removed section.
       std::vector<int> targets;
       for (const int id : lane.*links) {
         const FileLane* through = removed.lane(id);
@@ -72,8 +72,8 @@ void link_across(const FileSection& removed, std::vector<int> FileLane::* links,
   }
 }
 
-/// Removes a profile's records within [begin, end). If the road goes on and no record begins at `end`, the last removed
-/// record continues from there.
+/// Removes a profile's records within [begin, end). If the road continues beyond `end` and no record begins there, the
+/// last removed record is continued from `end`.
 void cut_out(double begin, double end, bool goes_on, Profile* profile) {
   std::vector<Cubic>& cubics = profile->cubics;
   const auto from = [&](double s) {
@@ -105,13 +105,13 @@ void bridge_section(std::size_t index, FileRoad* road) {
   std::vector<FileSection>& sections = road->sections;
   const FileSection removed = std::move(sections[index]);
   const bool goes_on = index + 1 < sections.size();
-  // A lane offset that applies only within the removed section would shift the ends of adjacent sections.
+  // Otherwise, a lane offset that applies only within the removed section would shift the ends of adjacent sections.
   cut_out(removed.s, removed.end, goes_on, &road->lane_offset);
   if (index > 0) {
     link_across(removed, &FileLane::successors, &sections[index - 1]);
     sections[index - 1].end = removed.end;
   }
-  // The next section keeps its start, since its cubics and marks are relative to that.
+  // The next section keeps its start, because its cubics and marks are relative to its start.
   if (goes_on) link_across(removed, &FileLane::predecessors, &sections[index + 1]);
   sections.erase(sections.begin() + static_cast<std::ptrdiff_t>(index));
 }

@@ -1,5 +1,5 @@
-// Operations on sections: splitting and removing sections, and ending profiles. Lanes that continue from one
-// FileSection into the next are one lane of the file.
+// Operations on lane sections: splits and removes sections, and ends profiles. A lane that is continued from one
+// FileSection into the next is a single lane of the file.
 #pragma once
 
 #include <vector>
@@ -8,22 +8,23 @@
 
 namespace pictura::opendrive {
 
-/// Splits the lanes of a section at `ds` after its start. The lanes keep the parts before; the parts beyond are
-/// returned as lanes of a new section. Each lane and its continuation are linked to each other.
+/// Splits the lanes of a section at the distance `ds` from its start. Returns the parts beyond as lanes of a new
+/// section; `lanes` keeps the parts before. Each lane and its continuation are linked to each other.
 std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds);
 
-/// Removes a section without length. The previous section is extended to its end, links that led into it lead to the
-/// section beyond, and a lane offset that applies only within it is removed.
+/// Removes a section without length. The previous section is extended to the removed section's end. Links into the
+/// removed section lead to the section beyond it. A lane offset that applies only within the removed section is
+/// removed.
 void bridge_section(std::size_t index, FileRoad* road);
 
-/// Makes elevation, banking, lane offset and widths constant from s on, where the file's description ends, instead of
-/// extrapolating their cubics.
+/// Makes elevation, banking, lane offset and widths constant from s on, instead of extrapolating their cubics. s is the
+/// station where the file's description of the road ends.
 void hold_profiles(double s, FileRoad* road);
 
 /// Returns the last section that begins at or before s, or the first section.
 const FileSection& section_at(const FileRoad& road, double s);
 
-/// Splits the section at s, unless s is within 0.5 m of its ends. Returns whether it was split.
+/// Splits the section at s, unless s is within 0.5 m of the section's ends. Returns whether the section was split.
 bool split_section(double s, FileRoad* road);
 
 /// Splits sections where the speed limit of the road or of one of its lanes changes, so that each lane has one limit.

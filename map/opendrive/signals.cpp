@@ -1,6 +1,6 @@
-// Construction of junctions, traffic lights and signs. A light refers to lanes of a connecting road, or of the road
-// that leads to the junction. The rest follows from the lane graph: the stop line is at the start of the junction's
-// lanes, the predecessors of these lanes are the incoming lanes, and the light faces the incoming lanes.
+// Builds junctions, traffic lights and signs. A light of the file applies to lanes of a connecting road, or of the road
+// that leads to the junction. The rest follows from the lane graph. The stop line is at the start of the junction's
+// lanes, the predecessors of these lanes are the incoming lanes, and the light faces the traffic of the incoming lanes.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -16,10 +16,10 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Height of a head above the foot of its post, which files do not contain. A head beyond the junction is assumed to
-// hang on a mast arm.
+// Heights of near and far heads above the foot of their post. Files do not contain these heights. A far head is assumed
+// to hang on a mast arm.
 constexpr double kNearHeadHeight_m = 3.5, kFarHeadHeight_m = 5.5;
-// Distance beyond the stop line from which a head is on the far side.
+// Minimum distance beyond the stop line of a far head.
 constexpr float kFarHead_m = 5.0f;
 constexpr float kMinStopLine_m = 0.1f;
 
@@ -33,7 +33,7 @@ struct Phase {
   int32_t junction = -1, phase = 0;
 };
 
-/// Lanes that one signal controls on one approach road, ascending.
+/// Lanes that one signal controls on one approach road, in ascending order.
 struct Approach {
   std::vector<int32_t> incoming, connecting;
 };
@@ -87,7 +87,7 @@ class SignalBuilder {
   }
 
  private:
-  /// Approaches by the index of the approach road and by whether its traffic runs along s.
+  /// Approaches. The key is the index of the approach road, and whether its traffic travels towards growing s.
   using Approaches = std::map<std::pair<int32_t, bool>, Approach>;
 
   /// An approach without a controller. All heads of the approach share one stop line.
@@ -108,7 +108,7 @@ class SignalBuilder {
     }
   }
 
-  /// Returns controllers by id, with only their existing signals.
+  /// Returns the controllers by id. References to signals that do not exist are removed.
   std::unordered_map<std::string, FileController> valid_controllers() {
     std::unordered_map<std::string, FileController> controllers;
     for (const FileController& controller : build_.network.controllers) {
@@ -127,8 +127,8 @@ class SignalBuilder {
     return controllers;
   }
 
-  /// Finds phases: the phase of a light is the rank of its sequence number among the sequence numbers of its junction's
-  /// controllers of lights.
+  /// Finds the phases of lights. A light's phase is the rank of its controller's sequence number among the controllers
+  /// of lights of the junction.
   void find_phases() {
     const std::unordered_map<std::string, FileController> controllers = valid_controllers();
     for (std::size_t j = 0; j < build_.network.junctions.size(); ++j) {
@@ -160,12 +160,13 @@ class SignalBuilder {
     return map_.lane_points[static_cast<std::size_t>(lane(index).points.end) - 1];
   }
 
-  /// Adds the lanes at s of a road to which a signal applies: the lanes of its validity, else all lanes of its
-  /// orientation. Lanes that meet at the stop line of a light away from junctions form an approach.
+  /// Adds the lanes to which a signal applies at its s on a road: the lanes of its validity if it has one, else all
+  /// lanes of its orientation. For a light away from junctions, the lanes that meet at its stop line form an approach.
   template <typename Signal>
   void collect(std::size_t signal_index, std::size_t road, const Signal& signal) {
     const FileRoad& file_road = build_.network.roads[road];
-    // References are often placed in the middle of a road, so lane ids refer to the section at their station.
+    // Lane ids refer to the section at the station of the signal or reference, because references are often in the
+    // middle of a road.
     const FileSection& section = section_at(file_road, signal.stop_s.value_or(signal.s));
     const SectionLanes& lanes = build_.lanes[road][&section - file_road.sections.data()];
     for (const std::vector<FileLane>* side : {&section.left, &section.right}) {
@@ -193,7 +194,7 @@ class SignalBuilder {
     }
   }
 
-  /// Returns this lane and the chain of its predecessors (or successors) on the same road, nearest first.
+  /// Returns lane `from` and the chain of its predecessors (or successors) on the same road, nearest first.
   std::vector<int32_t> along_road(int32_t from, IndexRange Lane::* onward) const {
     std::vector<int32_t> chain{from};
     for (bool more = true; more;) {
@@ -209,9 +210,9 @@ class SignalBuilder {
     return chain;
   }
 
-  /// Finds the approaches of a lane. A junction's lane is followed back to its start, where its drivable predecessors
-  /// are the incoming lanes. A lane that leads to a junction is followed to the road's end, and the last lane of this
-  /// chain is the incoming lane.
+  /// Finds the approaches of a lane. A junction lane is followed back to the start of its road; the drivable
+  /// predecessors there are the incoming lanes. A lane that leads to a junction is followed to the end of its road; the
+  /// last lane there is the incoming lane.
   void find_approaches(int32_t start, Approaches* approaches) const {
     if (lane(start).in_junction) {
       const std::vector<int32_t> connecting = along_road(start, &Lane::predecessors);
@@ -236,13 +237,13 @@ class SignalBuilder {
     approach.connecting.insert(approach.connecting.end(), connecting.begin(), connecting.end());
   }
 
-  /// Returns the junction of an approach, or -1.
+  /// Returns the junction of an approach, or -1 if it leads to none.
   int32_t junction_of(const Approach& approach) const {
     return approach.connecting.empty() ? -1 : lane(approach.connecting.front()).junction;
   }
 
-  /// Adds a head to the stop lines of the approaches that it controls. In a junction whose lights have controllers, a
-  /// head without a controller is omitted.
+  /// Adds a head without a controller to the stop lines of the approaches that it controls. Omits the head if other
+  /// lights of its junction have controllers.
   void add_uncontrolled(std::size_t signal_index, const Approaches& approaches) {
     const FileSignal& signal = *placed_signals_[signal_index].signal;
     if (const char* const junction = ruled_junction(approaches)) {
@@ -254,7 +255,7 @@ class SignalBuilder {
                                "no controller of a junction controls it");
     for (const auto& [way, approach] : approaches) {
       const int32_t junction_index = junction_of(approach);
-      // Away from junctions, lines are distinguished by their lanes.
+      // Away from junctions, the first incoming lane distinguishes lines.
       const int32_t first = junction_index < 0 ? approach.incoming.front() : -1;
       const auto [line, is_new] = uncontrolled_.try_emplace({junction_index, way, first});
       if (is_new) line->second.signal_index = signal_index;
@@ -264,7 +265,7 @@ class SignalBuilder {
     }
   }
 
-  /// Returns the name of a junction of the approaches whose lights have controllers; null if there is none.
+  /// Returns the name of a junction of the approaches that has lights with controllers, or null if there is none.
   const char* ruled_junction(const Approaches& approaches) const {
     for (const auto& [way, approach] : approaches) {
       const int32_t junction = junction_of(approach);
@@ -274,8 +275,8 @@ class SignalBuilder {
     return nullptr;
   }
 
-  /// Adds a light for each line without a controller. Lines of one junction with equal or opposite headings share a
-  /// phase; a line away from junctions is alone.
+  /// Adds a light for each line without a controller. Lines of one junction with roughly equal or opposite headings
+  /// share a phase. A line away from junctions has its own phase.
   void add_uncontrolled_lights() {
     std::map<int32_t, std::vector<double>> headings;  // [junction] headings of the first line of each phase
     for (auto& [key, line] : uncontrolled_) {
@@ -303,7 +304,7 @@ class SignalBuilder {
     const FileSignal& signal = *placed_signals_[signal_index].signal;
     Sign sign{.name = signal.id, .type = signal.type, .subtype = signal.subtype, .country = signal.country};
     sign.position_m = build_.to_map(position_of(signal_index));
-    // A sign has the heading of the lanes to which it applies, if there are any, since orientations set by editors are
+    // A sign has the heading of the lanes to which it applies, if there are any, because the orientations in files are
     // unreliable.
     double heading = pose_at(build_.network.roads[placed_signals_[signal_index].road], signal.s).heading;
     if (signal.orientation == Orientation::against) heading += std::numbers::pi;
@@ -388,7 +389,7 @@ class SignalBuilder {
   std::vector<std::vector<int32_t>> signal_lanes_;  // [signals] lanes to which the signal applies
   std::unordered_map<std::string, Phase> phases_;
   std::map<std::size_t, Approaches> lone_approaches_;  // [signals] away from junctions
-  // Key: junction, approach and, away from junctions, the first lane.
+  // The key is the junction, the approach and, away from junctions, the first incoming lane (else -1).
   std::map<std::tuple<int32_t, std::pair<int32_t, bool>, int32_t>, UncontrolledLine> uncontrolled_;
 };
 

@@ -10,10 +10,10 @@ namespace pictura::opendrive {
 namespace {
 
 constexpr double kMinSpan_m = 10, kSpanPerJump = 10;
-// Minimum ratio of span to jump. A smoothstep is 1.5 times as steep as its chord, so over this span the line turns by
-// less than 0.2 rad.
+// Minimum ratio of the span to the jump. With this ratio, the line turns by at most 0.2 rad, because a smoothstep is
+// 1.5 times as steep as its chord.
 constexpr double kMinSpanPerJump = 7.5;
-// Maximum length of the cubics that replace a moved line; their error is then below 0.1 mm.
+// Maximum length of the cubics that replace a moved line. It keeps their error below 0.1 mm.
 constexpr double kMaxCubic_m = 1;
 
 /// Range of s over which a jump is spread.
@@ -31,12 +31,12 @@ struct Spread : Stretch {
   Jump jump;
 };
 
-/// A point of the moved line and its derivative by s.
+/// A point of the moved line, and its derivative with respect to s.
 struct Knot {
   Eigen::Vector2d position_m, slope;
 };
 
-/// Cubic between two knots that are `length` apart in s.
+/// Returns the cubic between two knots that are `length` apart in s.
 GeometryPiece cubic_between(const Knot& a, const Knot& b, double s, double length) {
   GeometryPiece piece;
   piece.s = s;
@@ -69,7 +69,7 @@ class JumpSpreader {
   }
 
  private:
-  /// Appends the geometry, or cubics that replace it if it touches a stretch.
+  /// Appends the geometry if no jump is spread over it, else cubics that replace it.
   void replace(std::size_t index) {
     const GeometryPiece& piece = road_.geometry[index];
     const double piece_end = piece.s + piece.length;
@@ -114,7 +114,7 @@ class JumpSpreader {
 
   FileRoad& road_;
   std::vector<Spread> spreads_;
-  std::vector<const Spread*> active_;  // stretches that touch the current geometry
+  std::vector<const Spread*> active_;  // jumps that are spread over the current geometry
   std::vector<GeometryPiece> moved_;
 };
 
@@ -128,7 +128,7 @@ Cubic continued(const Cubic& cubic, double s) {
           .d = cubic.d};
 }
 
-/// Smoothstep from 0 to `rise` over the stretch.
+/// Returns the smoothstep from 0 to `rise` over the stretch.
 Cubic smoothstep(const Stretch& stretch, double rise) {
   const double span = stretch.end - stretch.begin;
   return {.s = stretch.begin, .c = 3 * rise / (span * span), .d = -2 * rise / (span * span * span)};

@@ -1,5 +1,5 @@
-// Construction of road edges and building lines from the lane surfaces, as bands, of an OpenDRIVE network. Road edges
-// are the outline of the drivable lanes; building lines run on free ground.
+// Builds road edges and building lines of an OpenDRIVE network. Lane surfaces are bands. Road edges are the outline of
+// the drivable lanes. Building lines are on free ground.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,13 +14,13 @@ namespace {
 
 // Chord error of the bands for road edges, which must be much more precise than the drawn surface.
 constexpr double kEdgeBandChordError_m = 0.001;
-// Chord error of the bands for building lines. These keep a clearance from the surface, so less precision is enough.
+// Chord error of the bands for building lines. It may be larger, because buildings keep a clearance from the surface.
 constexpr double kLotBandChordError_m = 0.05;
 constexpr double kBandPiece_m = 5.0;
 
 constexpr double kSetback_m = 1.0;    // distance of a building from the outermost lane
 constexpr double kLotDepth_m = 6.0;   // depth of free ground behind a building's line
-constexpr double kClearance_m = 0.5;  // distance of a building from any surface, including beyond the ends of its line
+constexpr double kClearance_m = 0.5;  // distance of a building, also of its ends, from any surface
 constexpr double kProbeStep_m = 1.0;
 constexpr double kBuildingPiece_m = 8.0;  // length of a piece of a building line
 constexpr double kAnyLevel_m = 1e9;
@@ -31,7 +31,7 @@ SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& sec
   auto border = [&](double outer_fraction, double s) {
     return build->from_origin(point_on_lane(road, section, lane, s, outer_fraction, &build->stations));
   };
-  // Both borders are sampled at the union of the stations that each border needs.
+  // Each border is sampled at the stations that it needs; the band uses the stations of both borders.
   const CurveBreaks breaks = breaks_of(road, section, lane.id, section.s, section.end);
   std::array<std::vector<CurvePoint>, 2> sampled;
   std::vector<double> stations;
@@ -59,7 +59,7 @@ SurfaceBand lane_band(Build* build, const FileRoad& road, const FileSection& sec
   return band;
 }
 
-/// Returns one band per selected lane of the map. roads_out, unless null, receives the road of each band.
+/// Returns one band for each selected lane of the map. If roads_out is not null, it receives the road of each band.
 template <typename IsSelected>
 std::vector<SurfaceBand> lane_bands(Build* build, double chord_error_m, std::vector<int32_t>* roads_out,
                                     IsSelected&& is_selected) {
@@ -84,8 +84,8 @@ int outermost_lane(const std::vector<FileLane>& side) {
   return 0;
 }
 
-/// Whether the ground for a building along a-b is free: no surface on, near or closely behind it. The road is to the
-/// right of a-b.
+/// Whether the ground for a building along a-b is free: no surface is on it, near it, or up to kLotDepth_m behind it.
+/// The road is to the right of a-b.
 bool is_free(const Surface& surface, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   const double length_m = plan_distance_m(a, b);
   const Eigen::Vector2d along = (b - a).head<2>() / length_m, left{-along.y(), along.x()};
@@ -148,7 +148,7 @@ void build_building_lines(Build* build) {
           const Eigen::Vector3d a = at(sign > 0 ? low : high), b = at(sign > 0 ? high : low);
           const double length_m = plan_distance_m(a, b);
           if (length_m < 2 * kClearance_m || length_m > kMaxPiece_m || !is_free(surface, a, b)) continue;
-          // On the inside of a bend whose radius is smaller than the offset, the line reverses direction.
+          // Skips lines that run backwards, as on the inside of a bend whose radius is smaller than the line's offset.
           const double heading = pose_at(road, 0.5 * (low + high)).heading;
           const Eigen::Vector2d forward{std::cos(heading), std::sin(heading)};
           if (sign * (b - a).head<2>().dot(forward) < 0.5 * length_m) continue;

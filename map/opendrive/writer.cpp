@@ -162,7 +162,7 @@ void add_speed(pugi::xml_node parent, double limit_mps, const double* station = 
   }
 }
 
-/// Adds a lane; `successors` are those of the whole <lane>, which may continue in later sections.
+/// Adds a lane. `successors` are the successors of the whole <lane>, which may continue in later sections.
 void add_lane(pugi::xml_node side, const FileLane& lane, const std::vector<int>& successors) {
   pugi::xml_node node =
       add(side, "lane", {{"id", lane.id}, {"type", lane.type_name}, {"level", lane.is_level ? "true" : "false"}});
@@ -187,8 +187,7 @@ void add_lane(pugi::xml_node side, const FileLane& lane, const std::vector<int>&
 
 bool is_continued(const std::vector<FileLane>& side) { return !side.empty() && side.front().is_continued; }
 
-/// Returns the successors of a lane. If the lane continues in later sections, these are the successors of its last
-/// part.
+/// Returns the successors of a lane. If the lane continues in later sections, returns the successors of its last part.
 std::vector<int> successors_of(const FileRoad& road, std::size_t section, const FileLane& lane) {
   while (section + 1 < road.sections.size()) {
     const FileLane* next = road.sections[section + 1].lane(lane.id);
@@ -287,8 +286,8 @@ void add_signals(pugi::xml_node road_node, const FileRoad& road) {
   }
 }
 
-/// Assigns object ids: the object's own id, or a new one if it is empty or already used in the file, as by copies of a
-/// <repeat>.
+/// Assigns object ids. An object gets its own id, or a new id if its own is empty or already used in the file. For
+/// example, copies of a <repeat> have the same id.
 class ObjectIds {
  public:
   explicit ObjectIds(const Network& network) {

@@ -1,4 +1,4 @@
-// Writer from a Network to the text of an OpenDRIVE file.
+// Writes a Network as the text of an OpenDRIVE file.
 #pragma once
 
 #include <string>
@@ -9,9 +9,9 @@
 
 namespace pictura::opendrive {
 
-/// Writes a network as OpenDRIVE text. Numbers have enough digits to read back the same double, so that reading the
-/// output and writing it again changes nothing. Data that a Network lacks (names, weights and materials of marks,
-/// objects other than crosswalks, parking spaces and stop lines) is not written.
+/// Returns a network as OpenDRIVE text. Numbers have enough digits to be read back as the same double. So the text does
+/// not change if it is read and written again. Data that a Network lacks is not written: names, weights and materials
+/// of marks, and all objects except crosswalks, parking spaces and stop lines.
 std::string write_opendrive(const Network& network);
 
 }  // namespace pictura::opendrive
@@ -19,7 +19,7 @@ std::string write_opendrive(const Network& network);
 namespace pictura {
 
 /// Reads the text of an OpenDRIVE file and returns OpenDRIVE text with only the data that the importer uses. Throws
-/// Error naming `source`, line and element if the importer rejects the file.
+/// Error, which names `source`, line and element, if the importer rejects the file.
 std::string export_opendrive(std::string_view text, const std::string& source);
 
 }  // namespace pictura
