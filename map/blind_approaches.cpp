@@ -11,16 +11,16 @@ namespace pictura {
 
 namespace {
 
-constexpr float kEyeHeight_m = 1.5f;  // above the road, like the cameras
-// Box of the crossing vehicle: a CARLA car.
+constexpr float kEyeHeight_m = 1.5f;  // above the road, like the cameras of vehicles
+// Box of the crossing vehicle. It has the size of a CARLA car.
 constexpr float kCarLength_m = 4.5f, kCarWidth_m = 2.0f, kCarHeight_m = 1.5f;
 
 /// A path through a junction, including the lanes that lead to it.
 struct Path {
   int32_t approach = -1;     // lane before the junction
   int32_t road = -1;         // road of the approach lane
-  std::vector<Vec3> points;  // from far enough before the junction, if the lanes extend that far
-  std::vector<float> s_m;    // [points] arc length, 0 at the start of the junction
+  std::vector<Vec3> points;  // begin at least lead_m before the junction if the lanes are long enough
+  std::vector<float> s_m;    // [points] arc length; 0 at the start of the junction
   size_t first_inside = 0;   // index of the point at arc length 0
 };
 
@@ -93,7 +93,7 @@ struct PathPose {
   Vec2 forward;
 };
 
-/// Returns the pose at s_m; nothing if the path begins after s_m.
+/// Returns the pose at s_m, or nothing if the path begins after s_m.
 std::optional<PathPose> pose_at(const Path& path, float s_m) {
   if (s_m < path.s_m.front()) return std::nullopt;
   const auto after = std::upper_bound(path.s_m.begin() + 1, path.s_m.end() - 1, s_m);
@@ -113,7 +113,8 @@ AgentBox car_at(const PathPose& pose) {
           .height_m = kCarHeight_m};
 }
 
-/// Calls f(own path, other path, whether the other car is hidden) for ordered pairs of crossing paths.
+/// Calls f(own path, other path, is_hidden) for ordered pairs of crossing paths. `is_hidden` tells whether the car on
+/// the other path is hidden.
 template <typename F>
 void visit_crossings(const RoadMap& map, Span<const WallFace> walls, float distance_m, const F& f) {
   std::vector<std::vector<Path>> of_junction(map.junctions.size());

@@ -17,8 +17,8 @@ LaneGroups group_lanes(const RoadMap& map) {
 
 void find_endless_lanes(RoadMap* map_inout) {
   RoadMap& map = *map_inout;
-  // A group without successor groups is a dead end. Dead ends are removed repeatedly, since each removal may leave
-  // predecessors without successors.
+  // A group without successor groups is a dead end. Removing a dead end may turn its predecessors into dead ends, so
+  // dead ends are removed repeatedly.
   const LaneGroups groups = group_lanes(map);
   const std::vector<std::size_t>& group = groups.of_lane;
   const std::vector<std::vector<std::size_t>>& members = groups.members;

@@ -14,7 +14,7 @@ namespace pictura {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-// Positions this close along a lane are equal up to rounding.
+// Maximum distance of positions on a lane that count as equal, because of rounding.
 constexpr double kSamePosition_m = 1e-3;
 
 std::size_t at(int32_t index) { return static_cast<std::size_t>(index); }
@@ -52,7 +52,7 @@ double LaneGraph::distance_to_end_m(int32_t node, double begin_fraction) const {
   return (node < num_lanes() ? 1 : 1 - begin_fraction) * length_m_[at(lane_of(node))];
 }
 
-// Dijkstra's algorithm (A note on two problems in connexion with graphs, 1959).
+// Uses Dijkstra's algorithm (A note on two problems in connexion with graphs, 1959).
 LaneGraph::Search LaneGraph::search(LanePosition from) const {
   check(from);
   Search result;
@@ -89,7 +89,8 @@ LaneGraph::Search LaneGraph::search(LanePosition from) const {
 std::optional<LaneRoute> LaneGraph::route(LanePosition from, LanePosition to) const {
   check(to);
   const Search result = search(from);
-  // The goal is either ahead of the start position, by lane changes only, or reached through the start of its lane.
+  // A route reaches the goal either from a position beside the start position, by lane changes only, or through the
+  // start of the goal's lane.
   int32_t node = to.lane;
   double last_m = to.s_m;
   const int32_t start_node = num_lanes() + to.lane;
@@ -131,13 +132,13 @@ LaneComponents LaneGraph::components() const {
   LaneComponents result;
   result.of_lane.assign(length_m_.size(), kUnvisited);
   std::vector<int32_t> order(length_m_.size(), kUnvisited);  // [lanes] visiting order
-  std::vector<int32_t> lowest(length_m_.size());             // [lanes] lowest order known in the same component
+  std::vector<int32_t> lowest(length_m_.size());  // [lanes] lowest known order of a lane in the same component
   std::vector<int32_t> unassigned;
   struct Visit {
     int32_t lane;
     std::size_t next_edge;
   };
-  std::vector<Visit> path;  // an explicit stack: chains of lanes may exceed the program's call stack
+  std::vector<Visit> path;  // an explicit stack, because recursion along many lanes could overflow the call stack
   int32_t num_visited = 0;
   const auto enter = [&](int32_t lane) {
     order[at(lane)] = lowest[at(lane)] = num_visited++;
@@ -164,7 +165,8 @@ LaneComponents LaneGraph::components() const {
         lowest_before = std::min(lowest_before, lowest[at(lane)]);
       }
       if (lowest[at(lane)] != order[at(lane)]) continue;
-      // The root of its component: the component consists of all lanes that were visited since and have no component.
+      // The lane is the root of its component. The component consists of all lanes that were visited since the root and
+      // have no component yet.
       int32_t member = kUnvisited;
       do {
         member = unassigned.back();

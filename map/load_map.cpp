@@ -25,20 +25,22 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kExtension = ".xodr", kLanelet2Extension = ".osm";
-// Bytes for each crossing of a procedural town with streets of default length, in a file as large as CARLA's.
+// Size of a CARLA file per crossing, for a procedural town with streets of default length.
 constexpr double kFileBytesPerCrossing = 80e3;
-constexpr double kCrossingsPerMotorway = 12;  // a motorway's weight in crossings, plus one for each block along it
+// A motorway counts as this many crossings, plus one for each block along it.
+constexpr double kCrossingsPerMotorway = 12;
 constexpr std::size_t kMaxFile_bytes = std::size_t{1} << 29;
 
 std::vector<fs::path> town_folders() { return {fs::path(map_folder()), fs::path(map_folder()) / "carla"}; }
 
-/// FILE.osm[@LATITUDE,LONGITUDE].
+/// Parts of a name FILE.osm[@LATITUDE,LONGITUDE].
 struct Lanelet2Name {
   std::string path;
   std::optional<GeoPoint> origin;
 };
 
-/// Nothing for names of other maps. Throws UsageError naming it when what follows the @ is no place.
+/// Returns nothing for names of other maps. Throws UsageError, which names the map, if the text after the @ is not a
+/// place.
 std::optional<Lanelet2Name> parse_lanelet2_name(std::string_view name) {
   if (name.ends_with(kLanelet2Extension)) return Lanelet2Name{std::string(name), std::nullopt};
   const std::size_t at = name.rfind('@');
@@ -56,7 +58,7 @@ std::optional<Lanelet2Name> parse_lanelet2_name(std::string_view name) {
   return Lanelet2Name{std::string(name.substr(0, at)), GeoPoint{*latitude, *longitude}};
 }
 
-/// The file of a name that is not procedural. Throws UsageError when there is none.
+/// Returns the file of a map that is not procedural. Throws UsageError if there is none.
 std::string file_path_of(const std::string& name) {
   std::error_code error;
   if (const std::optional<Lanelet2Name> lanelet2 = parse_lanelet2_name(name)) return lanelet2->path;
@@ -95,7 +97,7 @@ RoadMap load_file(const std::string& name, const OpenDriveOptions& options, cons
     return lanelet2 ? parse_lanelet2(text, path, options, lanelet2->origin, progress)
                     : parse_opendrive(text, path, options, progress);
   };
-  // An origin makes another map of the file.
+  // With another origin, the file makes another map, so the origin is part of the cache path and key.
   const bool has_origin = lanelet2 && lanelet2->origin;
   const std::string cache_path = map_cache_path(has_origin ? name : path, options);
   if (cache_path.empty()) return import();
@@ -103,7 +105,7 @@ RoadMap load_file(const std::string& name, const OpenDriveOptions& options, cons
   try {
     if (const std::optional<std::string> cached = read_cached(cache_path)) {
       RoadMap map = decode_map(*cached, key, cache_path);
-      map.name = fs::path(path).stem().string();  // the cached file may come from another link's name
+      map.name = fs::path(path).stem().string();  // the cached file may have been written for another link to the file
       report->cached = true;
       return map;
     }
@@ -192,7 +194,7 @@ int64_t map_file_bytes(const std::string& name) {
   }
   std::error_code error;
   const std::uintmax_t bytes = fs::file_size(file_path_of(original), error);
-  return error ? 0 : static_cast<int64_t>(bytes);  // an unreadable file is refused when it is loaded
+  return error ? 0 : static_cast<int64_t>(bytes);  // loading reports an unreadable file
 }
 
 MapText map_text(const std::string& name) {

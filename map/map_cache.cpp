@@ -17,7 +17,7 @@ namespace pictura {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'P', 'I', 'C', 'T', 'R', 'M', 'A', 'P'};
-constexpr uint32_t kVersion = 1;  // version of the header; the payload format is covered by the importer hash
+constexpr uint32_t kVersion = 1;  // version of the header; the importer's hash covers the payload's format
 
 struct MapCacheHeader {
   std::array<char, 8> magic = kMagic;

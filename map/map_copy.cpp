@@ -19,7 +19,7 @@ bool is_digits(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
-/// Appends the towns of FAMILY:FIRST-LAST[REST]; returns false for other names.
+/// Appends the names of the towns of a range FAMILY:FIRST-LAST[REST]. Returns false for other names.
 bool append_range(const std::string& name, std::vector<std::string>* names_out) {
   const TownFamily* family = town_family_of(name);
   if (!family || name == family->name) return false;

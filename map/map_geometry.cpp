@@ -36,7 +36,7 @@ Rgb mark_color(MarkColor color) {
   return kWhiteMarkColor;
 }
 
-/// Whether a light has this stop line: painted lines may lie some metres inside the junction.
+/// Whether a painted line is the stop line of a light. It may be some metres inside the junction.
 bool has_light(const RoadMap& map, const PaintedStopLine& line) {
   const Vec3 middle = (line.a_m + line.b_m) * 0.5f;
   return std::any_of(map.lights.begin(), map.lights.end(), [&](const TrafficLight& light) {
@@ -44,7 +44,8 @@ bool has_light(const RoadMap& map, const PaintedStopLine& line) {
   });
 }
 
-/// Draws consecutive edges that meet end to end as one polyline, so that their strips are mitred.
+/// Appends the strips of road edges. Consecutive edges that meet end to end form one polyline, so that their strips are
+/// mitred.
 void append_road_edges(const std::vector<RoadEdge>& edges, std::vector<Strip>* strips_out) {
   std::vector<Vec3> points;
   auto flush = [&] {
@@ -61,7 +62,8 @@ void append_road_edges(const std::vector<RoadEdge>& edges, std::vector<Strip>* s
   flush();
 }
 
-/// Height of the road of the light's lanes where they pass `at_m`, or of its stop line if no lane is nearer.
+/// Returns the height of the road near `at_m`: of the nearest point of the light's lanes, or of its stop line if that
+/// is nearer.
 float road_height_m(const RoadMap& map, const TrafficLight& light, Vec2 at_m) {
   Vec3 nearest = (light.stop_a_m + light.stop_b_m) * 0.5f;
   const auto apart_m = [at_m](Vec3 p) { return length(p.xy() - at_m); };
@@ -89,8 +91,8 @@ Vec3 head_position(const RoadMap& map, const TrafficLight& light, LightHeads hea
   return {at.x, at.y, road_height_m(map, light, at) + kVisibleHeadHeight_m};
 }
 
-/// Removes duplicate strips: overlapping roads of a junction may repeat a crosswalk. painted_lines() has already
-/// removed duplicate lane marks.
+/// Removes duplicate strips, because overlapping roads of a junction may repeat a crosswalk. painted_lines() has
+/// already removed duplicate lane marks.
 void remove_duplicates(std::vector<Strip>* strips_inout) {
   using Key = std::array<float, 15>;
   std::set<Key> keys;
@@ -164,7 +166,7 @@ std::vector<WallFace> make_walls(const RoadMap& map, const MapGeometryOptions& o
   float height_m = 0;
   for (const BuildingLine& line : map.building_lines) {
     if (remaining_pieces == 0) {
-      // Next building or gap, and its length in pieces of building line.
+      // Draws the next building or gap, and its length in pieces of building line.
       RandomStream random({.seed = options.wall_seed, .episode = num_draws++, .purpose = Purpose::walls});
       is_building = !is_building || random.uniform() < kTerracedFraction;
       remaining_pieces = 1 + random.below(is_building ? kMaxBuildingPieces : kMaxGapPieces);

@@ -10,7 +10,7 @@ namespace pictura {
 
 namespace {
 
-/// Values and their weights.
+/// Distribution of values with weights.
 class Distribution {
  public:
   void add(double value, double weight) {
@@ -40,7 +40,7 @@ void divide(std::array<double, N>* shares, double total) {
   for (double& share : *shares) share = total > 0 ? share / total : 0;
 }
 
-/// Number of driving lanes beside a lane in its direction, including the lane.
+/// Returns the number of driving lanes side by side in the direction of a lane, including the lane.
 int lanes_abreast(const RoadMap& map, const Lane& lane) {
   int count = 1;
   for (int32_t Lane::* side : {&Lane::left_neighbor, &Lane::right_neighbor}) {

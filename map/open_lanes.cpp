@@ -33,7 +33,7 @@ class LaneStarts {
               [](const Start& a, const Start& b) { return a.position_m.x < b.position_m.x; });
   }
 
-  /// Calls visit(lane, distance in plan) for each lane that starts within kMissingLink_m of p, on its level.
+  /// Calls visit(lane, distance in plan) for each lane that starts within kMissingLink_m of p, on the level of p.
   template <typename Visit>
   void visit_near(Vec3 p, Visit&& visit) const {
     auto start = std::lower_bound(starts_.begin(), starts_.end(), p.x - kMissingLink_m,
@@ -53,8 +53,9 @@ class LaneStarts {
   std::vector<Start> starts_;
 };
 
-/// Ways of groups of lanes. Lanes that agents can change between, and that begin and end together, form one node of an
-/// acyclic graph. Groups on which endless routes start are excluded.
+/// Length of the longest route after each group of lanes. A group contains lanes that begin and end together, between
+/// which agents can change lanes. Groups on which endless routes start are excluded, so the graph of groups has no
+/// cycles.
 class RemainingRouteLengths {
  public:
   RemainingRouteLengths(const RoadMap& map, const LaneGroups& groups) : way_after_m_(map.lanes.size(), INFINITY) {
@@ -93,11 +94,12 @@ class RemainingRouteLengths {
   float after_m(std::size_t group) const { return way_after_m_[group]; }
 
  private:
-  std::vector<float> way_after_m_;  // [lanes] of the groups, by their leftmost lane
+  std::vector<float> way_after_m_;  // [lanes] for the leftmost lane of each group
 };
 
-/// Appends the parts of an edge beside an opening that are at least kMinEdge_m long. The edge across an opening goes
-/// through its middle, but not always at right angles to the lane: where lanes widen, their centre lines are oblique.
+/// Appends the parts of an edge that are beside an opening and at least kMinEdge_m long. The edge across an opening
+/// passes through its middle. It is not always perpendicular to the lane, because centre lines are oblique where lanes
+/// widen.
 void append_edge_parts_beside(const RoadEdge& edge, const LaneOpening& opening, std::vector<RoadEdge>* parts_out) {
   constexpr float kOff_m = 0.1f, kBeyond_m = 0.05f, kMinEdge_m = 0.01f, kMaxAlong = 0.7f;
   const Vec2 a = edge.a_m.xy() - opening.middle_m.xy(), edge_m = (edge.b_m - edge.a_m).xy();
@@ -146,7 +148,7 @@ OpenLanes find_open_lanes(const RoadMap& map) {
       exits.push_back(opening_of(map, lane, false));
       starts.visit_near(exits.back().middle_m, [&](int32_t other, float gap_m) {
         if (groups.of_lane[other] == group) return;
-        // On a two-way lane the way back begins there.
+        // Skips the opposite lane of a two-way lane, which begins there.
         if (dot(opening_of(map, other, true).direction, exits.back().direction) <= 0) return;
         open.missing_links.push_back({lane, other, gap_m});
       });

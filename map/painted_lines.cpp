@@ -14,14 +14,14 @@ namespace pictura {
 
 namespace {
 
-// Maximum distance of coincident points: ends that meet, and duplicate paint. Of the line ends in CARLA's towns with a
-// continuation within 1 cm, 99 % have it within 1 mm.
+// Maximum distance of points that count as coincident, at ends that meet and in duplicate paint. In CARLA's towns, of
+// the line ends that continue within 1 cm, 99 % continue within 1 mm.
 constexpr float kCoincident_m = 1e-3f;
-// Tolerance of thinning. A duplicate may deviate sideways and beyond the ends by kCoincident_m each, and joining may
-// move points by the same amount; thinning gets the rest of kPaintTolerance_m.
+// Tolerance of thinning. A duplicate may deviate by kCoincident_m sideways and by kCoincident_m beyond the ends.
+// Joining may move points by kCoincident_m. Thinning uses the rest of kPaintTolerance_m.
 constexpr float kThinningTolerance_m = kPaintTolerance_m - 3 * kCoincident_m;
 constexpr float kMaxBend = 0.25f;                // sine of the angle between lines that continue each other
-constexpr float kMaxChord_m = 10 * kMaxPiece_m;  // bounds the time of thinning; chords are drawn in equal pieces
+constexpr float kMaxChord_m = 10 * kMaxPiece_m;  // bounds the time of thinning; drawing cuts chords into pieces
 constexpr float kPieceCell_m = 20.0f;
 
 bool have_equal_style(const PaintedLine& a, const PaintedLine& b) {
@@ -48,7 +48,7 @@ std::vector<PaintedLine> lines_of_markings(const RoadMap& map) {
   return lines;
 }
 
-/// Line segments in a grid, for tests whether they cover a given segment.
+/// Line segments in a grid, for tests of whether they cover a given segment.
 class PieceIndex {
  public:
   struct Piece {
@@ -69,8 +69,8 @@ class PieceIndex {
 
   const std::vector<Piece>& pieces() const { return pieces_; }
 
-  /// Whether lines cover the whole straight segment from a to b, each within tolerance_m(line); lines with negative
-  /// tolerance are ignored. max_m is the largest tolerance; gaps up to max_m are ignored.
+  /// Whether lines cover the whole straight segment from a to b, each line within tolerance_m(line). Lines with
+  /// negative tolerance are ignored. max_m is the largest tolerance, and gaps up to max_m are ignored.
   template <typename Tolerance>
   bool is_covered(Vec3 a_m, Vec3 b_m, float max_m, const Tolerance& tolerance_m) const {
     const float length_m = length(b_m - a_m);
@@ -93,7 +93,7 @@ class PieceIndex {
 
  private:
   struct Segment {
-    Vec3 begin_m, along;  // along: a unit vector
+    Vec3 begin_m, along;  // along is a unit vector
     float length_m = 0;
   };
   /// A part of a segment, in metres from its start.
@@ -101,8 +101,8 @@ class PieceIndex {
     float begin_m = 0, end_m = 0;
   };
 
-  /// Returns the part of a segment alongside a piece, if that part of the piece is within tolerance at both its ends;
-  /// else empty.
+  /// Returns the part of a segment that is alongside a piece. Returns an empty interval if the piece is farther away
+  /// than the tolerance at either end of that part.
   static Interval covered_interval(const Segment& segment, const Piece& piece, float tolerance_m) {
     const float a_m = dot(piece.a_m - segment.begin_m, segment.along),
                 b_m = dot(piece.b_m - segment.begin_m, segment.along);
@@ -119,8 +119,9 @@ class PieceIndex {
   Grid grid_;
 };
 
-/// Removes lines that others cover along their whole length: overlapping roads of a junction contain the same paint,
-/// cut in different places. Longer lines are processed first, and only kept lines count as cover.
+/// Removes lines that other lines cover along their whole length. Overlapping roads of a junction contain such lines:
+/// the same paint, cut at different places. Longer lines are processed first, and only lines that are kept cover
+/// others.
 class DuplicateLines {
  public:
   explicit DuplicateLines(std::vector<PaintedLine> lines)
@@ -167,8 +168,8 @@ class LineJoiner {
     match();
   }
 
-  /// Joins all lines. The result is in the order of their first lines, since among overlapping lane marks the lower
-  /// index is in front.
+  /// Joins all lines. Joined lines are in the order of their first parts, because the lower index is in front where
+  /// lane marks overlap.
   std::vector<PaintedLine> join() {
     std::vector<PaintedLine> joined;
     for (std::size_t line = 0; line < lines_.size(); ++line) {
@@ -185,7 +186,7 @@ class LineJoiner {
     return end % 2 == 0 ? points.front() : points.back();
   }
 
-  /// Unit vector in plan that points out of the line at this end.
+  /// Returns the unit vector in plan that points out of the line at this end.
   Vec2 outward(std::size_t end) const {
     const std::vector<Vec3>& points = lines_[end / 2].points_m;
     const Vec3 before = end % 2 == 0 ? points[1] : points[points.size() - 2];
@@ -193,10 +194,11 @@ class LineJoiner {
     return out * (1.0f / length(out));
   }
 
-  /// Pairs coincident ends, the straightest pair first: at a fork only one branch is joined.
+  /// Pairs coincident ends, the straightest pair first. At a fork, only one branch is joined.
   void match() {
     struct Pair {
-      float bend = 0, gap_m = 0;  // sine of the angle between the lines; distance between their ends
+      // Sine of the angle between the lines, and distance between their ends.
+      float bend = 0, gap_m = 0;
       std::size_t a = 0, b = 0;
     };
     std::vector<Aabb2> boxes;
@@ -224,7 +226,7 @@ class LineJoiner {
     }
   }
 
-  /// Returns the end where the chain of this line begins; rings begin with the line itself.
+  /// Returns the end where the chain of this line begins. A ring begins with the line itself.
   std::size_t chain_begin(std::size_t line) const {
     std::size_t end = 2 * line;
     while (partners_[end] != kNone) {

@@ -9,7 +9,7 @@ std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, do
   std::size_t first = 0;
   while (first + 1 < points.size()) {
     std::size_t last = first + 1;
-    // Bounds the time, because each further point tests all points of the piece again.
+    // Bounds the time, because each additional point requires a test of all points of the piece.
     constexpr std::size_t kMaxPoints = 1024;
     for (std::size_t next = last + 1; next < std::min(points.size(), first + kMaxPoints); ++next) {
       const CurvePoint &a = points[first], &b = points[next];

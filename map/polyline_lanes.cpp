@@ -28,7 +28,7 @@ void append_lane_points(const std::vector<CurvePoint>& points, RoadMap* map, Lan
     if (i > 0) s_m += plan_distance_m(points[i - 1].position_m, points[i].position_m);
     double heading = heading_of(i);
     if (i > 0 && i + 1 < points.size()) {
-      // Between the directions of the chords that meet here.
+      // The mean of the directions of the chords that meet here.
       heading = heading_of(i - 1) + 0.5 * std::remainder(heading - heading_of(i - 1), 2 * std::numbers::pi);
     }
     map->lane_points.push_back({to_vec3(points[i].position_m),
@@ -100,7 +100,7 @@ void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
       count_work(4);
       const LanePiece& other = driven.segments[item];
       if (other.lane <= segment.lane) return;
-      if (map.lanes[other.lane].source_road == map.lanes[segment.lane].source_road) return;  // both directions of one
+      if (map.lanes[other.lane].source_road == map.lanes[segment.lane].source_road) return;  // opposite lanes of a road
       const std::optional<Vec2> place = crossing(segment.a_m, segment.b_m, other.a_m, other.b_m);
       if (place && !is_end(segment.lane, *place) && !is_end(other.lane, *place)) {
         crossings.emplace_back(segment.lane, other.lane);
@@ -123,7 +123,7 @@ void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
     }
   }
   for (const int32_t lane : bridges) map.lanes[lane].in_junction = true;
-  // Lanes that cross are of one junction.
+  // Lanes that cross belong to one junction.
   std::vector<int32_t> group(map.lanes.size());
   std::iota(group.begin(), group.end(), 0);
   const auto first_of = [&](int32_t lane) {
@@ -140,7 +140,7 @@ void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
     group[std::max(a, b)] = std::min(a, b);
   };
   for (const auto& [a, b] : crossings) join(a, b);
-  // So are those that fork or merge.
+  // Lanes that fork or merge belong to one junction.
   for (const Lane& lane : map.lanes) {
     for (const IndexRange range : {lane.successors, lane.predecessors}) {
       int32_t before = -1;

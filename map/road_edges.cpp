@@ -17,7 +17,7 @@ constexpr double kBisectionTolerance_m = 0.002;  // tolerance of the bisection f
 constexpr double kMaxJoinGap_m = 0.06;           // maximum distance of outline ends that are joined
 constexpr double kMinOutline_m = 0.3;
 constexpr double kSamePoint_m = 1e-3;
-constexpr double kOwnReach_m = 1.0;  // at bends, neighbouring quads of a band overlap slightly
+constexpr double kOwnReach_m = 1.0;  // neighbouring quads of a band overlap slightly at bends
 
 /// A point on an outline and the band of its border.
 struct OutlinePoint {
@@ -27,8 +27,8 @@ struct OutlinePoint {
 
 Eigen::Vector3d lerp(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double u) { return a + u * (b - a); }
 
-/// Traverses the four sides of each band clockwise, with the surface to the right, and collects the parts on the
-/// outline.
+/// Traverses the four sides of each band clockwise, with the surface on the right, and collects the parts that are on
+/// the outline.
 class Tracer {
  public:
   Tracer(const std::vector<SurfaceBand>& bands, const Surface& surface) : bands_(bands), surface_(surface) {}
@@ -52,8 +52,8 @@ class Tracer {
   }
 
  private:
-  /// Traces the segment of a border between two neighbouring points. In a turn tighter than the band's width, the
-  /// segment may run backwards; the surface is then on its other side.
+  /// Traces the segment of a border between two neighbouring points. In a turn that is tighter than the band's width,
+  /// the segment may run backwards. Then the surface is on the left.
   void trace_border(const std::vector<Eigen::Vector3d>& border, std::size_t from, std::size_t to,
                     const SurfaceBand& sides) {
     const std::size_t quad = std::min(from, to);
@@ -77,7 +77,7 @@ class Tracer {
     if (is_skipped || length_m < 1e-9) return;
     const Eigen::Vector2d outward{-(b.y() - a.y()) / length_m, (b.x() - a.x()) / length_m};
     const int steps = std::max(1, static_cast<int>(std::ceil(length_m / kSampleStep_m)));
-    // The ends are excluded, because the adjacent segment decides there.
+    // The ends are excluded, because adjacent segments test them.
     const double margin = std::min(0.25, 1e-4 / length_m);
     double previous = margin;
     bool was_edge = is_outline(lerp(a, b, previous), outward, band_);
@@ -104,10 +104,10 @@ class Tracer {
     if (was_edge) append(b);
   }
 
-  /// Whether no other band covers the point just outside `p` on the border of `band`, the band does not fold over the
-  /// point, and no band of lower index emits the same shared border. Bands that share a border within kSharedBorder_m
-  /// may each extend slightly beyond the other. So the test recurses to check that the lower band really emits the
-  /// border; one of the bands always does.
+  /// Whether `p`, on the border of `band`, is on the outline. Three conditions must hold: no other band covers the
+  /// point just outside `p`, `band` does not fold over this point, and no band of lower index emits the same shared
+  /// border. Each of two bands that share a border within kSharedBorder_m may extend slightly beyond the other. So the
+  /// test recurses to check that the lower band really emits the border. Exactly one of the bands does.
   bool is_outline(const Eigen::Vector3d& p, const Eigen::Vector2d& outward, int32_t band) {
     surface_.find_near(p.head<2>(), p.z(), &near_);
     for (const double distance_m : {kSharedBorder_m, kMaxGap_m}) {
@@ -117,7 +117,7 @@ class Tracer {
     return is_outline_near(p, outward, band, 0);
   }
 
-  /// Variant for a place at most depth times kSharedBorder_m from the place of near_.
+  /// Variant of is_outline() for a point that is at most `depth` times kSharedBorder_m from the position of near_.
   bool is_outline_near(const Eigen::Vector3d& p, const Eigen::Vector2d& outward, int32_t band, int depth) const {
     constexpr int kMaxDepth = static_cast<int>((Surface::kNear_m - kMaxGap_m) / kSharedBorder_m) - 1;
     const Surface::Candidates& near = depth <= kMaxDepth ? near_ : none_;
@@ -159,14 +159,14 @@ class Tracer {
   const Surface& surface_;
   int32_t band_ = 0;
   std::size_t quad_ = 0;             // index in the band of the quad beside the current segment
-  double reach_m_ = kOwnReach_m;     // reach of that quad's neighbours, which do not count as a fold
+  double reach_m_ = kOwnReach_m;     // distance along the band within which quads do not count as a fold
   std::vector<bool> is_narrow_;      // [points of a side]
-  Surface::Candidates near_, none_;  // quads near the current place; empty, so that quads are looked up again
+  Surface::Candidates near_, none_;  // quads near the current point; an empty set, which causes new lookups
   std::vector<OutlinePoint> run_;
   std::vector<std::vector<OutlinePoint>> runs_;
 };
 
-/// Joins runs that meet end to start, so that pieces can be merged across bands.
+/// Joins runs (connected parts of the outline) that meet end to start, so that pieces can be merged across bands.
 class Joiner {
  public:
   explicit Joiner(std::vector<std::vector<OutlinePoint>> runs)
@@ -179,7 +179,7 @@ class Joiner {
 
   std::vector<std::vector<OutlinePoint>> join() {
     std::vector<std::vector<OutlinePoint>> joined;
-    // Open outlines first, from their start, then rings.
+    // Joins open outlines first, from their start, then rings.
     for (const bool rings : {false, true}) {
       for (std::size_t i = 0; i < runs_.size(); ++i) {
         if (is_joined_[i] || (!rings && has_predecessor(i))) continue;
@@ -260,7 +260,7 @@ std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double c
       if (!points.empty()) {
         const double step_m = plan_distance_m(points.back().position_m, p.position_m);
         if (step_m < kSamePoint_m) continue;
-        // The end of a wide road is one straight segment.
+        // Cuts long segments, such as the end of a wide road.
         const Eigen::Vector3d begin = points.back().position_m;
         const int pieces = std::max(1, static_cast<int>(std::ceil(step_m / kMaxPiece_m - kPieceRounding)));
         for (int i = 1; i < pieces; ++i) {
@@ -277,7 +277,7 @@ std::vector<RoadEdge> outline_of(const std::vector<SurfaceBand>& bands, double c
     const std::vector<std::size_t> indices = thin_polyline(points, chord_error_m, kMaxPiece_m);
     for (std::size_t i = 1; i < indices.size(); ++i) {
       const Eigen::Vector3d &a = points[indices[i - 1]].position_m, &b = points[indices[i]].position_m;
-      if (plan_distance_m(a, b) < kSamePoint_m) continue;  // a deviation below the tolerance, and back
+      if (plan_distance_m(a, b) < kSamePoint_m) continue;  // the outline returns to the same point
       edges.push_back({to_vec3(a), to_vec3(b)});
       if (bands_out) bands_out->push_back(bands_of_points[indices[i - 1]]);
     }

@@ -11,7 +11,7 @@ namespace pictura {
 namespace {
 
 constexpr float kMaxCoordinate_m = 2e5f;
-// Pieces of exactly kMaxPiece_m may grow when their ends are rounded to float.
+// Pieces of kMaxPiece_m may become longer when their ends are rounded to float.
 constexpr float kPieceTolerance_m = 0.05f;
 
 void check_index(const char* what, std::size_t item, const char* field, int32_t index, std::size_t count,
@@ -42,7 +42,7 @@ void check_number(const char* what, std::size_t item, const char* field, float v
                 low, high, value);
 }
 
-/// Checks that every lane listed in `range` of lane i lists lane i in its `mirror`.
+/// Checks that links are mutual: if lane i lists another lane in `range`, the other lane must list lane i in `mirror`.
 void check_mutual(const RoadMap& map, IndexRange Lane::* range, IndexRange Lane::* mirror, const char* field) {
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     for (const int32_t other : map.links(map.lanes[i].*range)) {
@@ -159,7 +159,7 @@ void validate_lights(const RoadMap& map) {
   }
 }
 
-/// Checks that either every element has a source or none has, as in a map that was not read from text.
+/// Checks that every element has a source, or that none has. None has one in a map that was not read from text.
 void validate_provenance(const RoadMap& map) {
   const auto check = [&](const char* what, const std::vector<SourceElement>& sources, std::size_t count) {
     PICTURA_CHECK(sources.empty() || sources.size() == count, "provenance: expected the sources of {} {}s, got {}",

@@ -9,7 +9,7 @@ namespace pictura {
 namespace {
 
 constexpr float kQuadCell_m = 4.0f;
-// Budget of quad tests of a surface: a constant, plus an amount per quad.
+// Maximum number of quad tests of a surface: a constant plus a number per quad.
 constexpr int64_t kBaseLookups = 10'000'000, kLookupsPerQuad = 5000;  // CARLA's towns need up to 544 per quad
 
 double cross_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& p) {
@@ -74,8 +74,8 @@ void Surface::ItemBounds::push_back(const QuadBounds& bounds) {
   high_z.push_back(bounds.high_z);
 }
 
-/// Returns the bounds of a quad. For a triangle of almost no area, the test depends on rounding, which may let the
-/// triangle cover points far along its line. Such quads are bounded only in height.
+/// Returns the bounds of a quad. For a triangle of almost no area, the test depends on rounding, and may accept points
+/// far away along the triangle's line. So quads with such triangles are bounded only in height.
 Surface::QuadBounds Surface::bounds_of(const Quad& quad) const {
   constexpr float kMargin_m =
       static_cast<float>(kNear_m) + 0.05f;  // far more than the rounding of coordinates to float
@@ -122,7 +122,7 @@ bool Surface::is_folded_over(const Candidates& near, const Eigen::Vector2d& p, d
   return std::any_of(near.quads.begin(), near.quads.end(), [&](int32_t quad) { return covers_far(quads_[quad]); });
 }
 
-/// Tests two triangles, so that non-convex quads are covered as drawn.
+/// Tests two triangles, so that a quad that is not convex covers the area that is drawn.
 bool Surface::covers(const Quad& quad, const Eigen::Vector2d& p) {
   const Eigen::Vector2d* c = quad.corners_m;
   return in_triangle(c[0], c[1], c[2], p) || in_triangle(c[0], c[2], c[3], p);

@@ -1,5 +1,5 @@
-// Stages of make_scenario(), in order of execution. Each stage fills its own parts of the scenario and may read parts
-// of earlier stages. docs/reference/scenario.md lists the rules.
+// Stages of make_scenario(), which converts a recorded scene to a scenario, in the order of execution. Each stage fills
+// its own parts of the scenario, and may read parts of earlier stages. docs/reference/scenario.md lists the rules.
 #pragma once
 
 #include <cstdint>
@@ -26,16 +26,16 @@ struct Conversion {
   Eigen::Vector3d origin{0, 0, 0};
   std::vector<std::size_t> logged_lane{};             // [map.lanes] index into scene.lanes
   std::unordered_map<int64_t, int32_t> lane_of_id{};  // index into map.lanes
-  int64_t remaining_work = 400'000'000;               // work left for all loops whose length depends on a file
+  int64_t remaining_work = 400'000'000;               // steps left for all loops whose length depends on a file
 
-  /// Counts work, so that no file can take minutes. Throws Error at the limit.
+  /// Counts `amount` steps of work, so that no file can take minutes. Throws Error at the limit.
   void count_work(std::size_t amount) {
     remaining_work -= static_cast<int64_t>(amount);
     if (remaining_work < 0) fail("{}: its map exceeds the work limit of a scene", scene.source);
   }
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const { return p - origin; }
-  /// If a program stated the scene, rounds a point as a map stores it, so that scene_of_scenario() returns the same
-  /// point.
+  /// If a program wrote the scene (is_authored), rounds a point to the precision of a map. So scene_of_scenario() later
+  /// returns the same point.
   Eigen::Vector3d rounded(const Eigen::Vector3d& p) const {
     if (!scene.is_authored) return p;
     const Eigen::Vector3d stated_again = origin + p.cast<float>().cast<double>();
@@ -43,17 +43,18 @@ struct Conversion {
   }
 };
 
-/// Returns the points relative to the origin, without duplicates, and with points inserted so that no piece is too
-/// long.
+/// Removes duplicate points, and inserts points so that no piece is too long. Points are relative to the origin. `what`
+/// names the line in notes.
 std::vector<CurvePoint> cut_into_pieces(Conversion* conversion, const std::vector<CurvePoint>& points,
                                         const std::string& what);
 
-/// Returns the points relative to the origin, cut into pieces and thinned; empty if there are fewer than two points.
-/// Throws Error naming `what` if a point is too far from the origin.
+/// Converts points to points relative to the origin, cut into pieces and thinned. Returns an empty line if there are
+/// fewer than two points. Throws Error, which names `what`, if a point is too far from the origin.
 std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& points, const std::vector<double>& widths,
                                   const std::string& what);
 
-/// Sets the origin: the centre of the lanes' and edges' bounding box, in whole metres.
+/// Sets the origin to the centre of the bounding box of lanes and edges, in whole metres, unless the scene has an
+/// origin.
 void choose_origin(Conversion* conversion);
 void make_lanes(Conversion* conversion);
 void link_lanes(Conversion* conversion);

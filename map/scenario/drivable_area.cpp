@@ -10,7 +10,7 @@ namespace {
 
 constexpr float kEdgeCell_m = 10.0f;
 constexpr float kMeet_m = 0.01f;   // maximum distance between the ends of consecutive pieces of a polyline
-constexpr float kClosed_m = 1.0f;  // polylines whose ends are this near form rings
+constexpr float kClosed_m = 1.0f;  // maximum distance between the ends of a polyline that forms a ring
 constexpr float kMoving_mps = 0.5f;
 
 Aabb2 box_of(Vec2 a, Vec2 b, float margin_m) {
@@ -60,7 +60,7 @@ bool DrivableArea::touches_edge(const GroundBox& box) const {
     if (touches) return;
     const SideEdge& edge = sides_.edges[index];
     const Vec2 a = (edge.a_m - box.center_m).xy(), way = (edge.b_m - edge.a_m).xy();
-    // Part of the edge that is between both pairs of sides.
+    // The part from begin to end of the edge is between both pairs of sides of the box.
     float begin = 0, end = 1;
     for (const auto& [axis, half] : {std::pair{forward, half_length}, std::pair{left, half_width}}) {
       const float at = dot(a, axis), rate = dot(way, axis);

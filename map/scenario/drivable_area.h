@@ -1,5 +1,5 @@
-// Drivable area of a map that has edges alone: a place is on the road if it is on the drivable side of the nearest
-// edge. For logged maps, whose lanes do not give the extent of the road.
+// Drivable area of a map according to its road edges: a position is on the road if it is on the drivable side of the
+// nearest edge. Recorded maps need this rule, because their lanes do not determine the extent of the road.
 #pragma once
 
 #include <cstdint>
@@ -19,32 +19,34 @@ struct GroundBox {
   float length_m = 0, width_m = 0;
 };
 
-/// Edges of a map for road_side(), and the cells that they touch.
+/// Edges of a map for road_side(), and the grid cells that they touch.
 struct SideEdges {
-  std::vector<SideEdge> edges;  // as RoadMap::road_edges
+  std::vector<SideEdge> edges;  // parallel to RoadMap::road_edges
   Grid cells;
 };
 SideEdges side_edges_of(const RoadMap& map);
 
-/// Drivable area with a copy of the map data that it needs.
+/// Drivable area of a map, with its own copy of the map data that it needs.
 class DrivableArea {
  public:
   explicit DrivableArea(const RoadMap& map) : sides_(side_edges_of(map)) {}
 
   RoadSide side_of(Vec3 position_m) const { return road_side(sides_.edges, sides_.cells.view(), position_m); }
 
-  /// Whether an edge on the box's level (heights within 2 m) is inside the box or crosses it.
+  /// Whether an edge crosses the box or is inside it. Only edges that differ in height from the box by less than 2 m
+  /// count.
   bool touches_edge(const GroundBox& box) const;
 
  private:
   SideEdges sides_;
 };
 
-/// Agreement of logged traffic with the map's edges, over the steps of moving vehicles.
+/// Agreement of recorded traffic with the map's edges, counted over the steps of moving vehicles.
 struct LoggedDriving {
-  int64_t vehicle_steps = 0;  // valid steps, at 0.5 m/s or more, of vehicles with moving tracks (is_moving())
-  int64_t touching = 0;       // vehicle steps in which the box touches an edge
-  int64_t off_road = 0;       // vehicle steps in which the box's centre is not on the road
+  // Valid steps at 0.5 m/s or more, of vehicles whose track moves (is_moving()).
+  int64_t vehicle_steps = 0;
+  int64_t touching = 0;  // vehicle steps in which the box touches an edge
+  int64_t off_road = 0;  // vehicle steps in which the box's centre is not on the road
 };
 LoggedDriving logged_driving(const Scenario& scenario);
 

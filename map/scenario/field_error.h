@@ -1,5 +1,5 @@
-// Faults inside a record of a scene file. Readers throw the innermost field's name and add the enclosing names while
-// the exception propagates, so that a message has the full path and valid files have no overhead.
+// Faults inside a record of a scene file. Readers throw the innermost field's name, and add the names of enclosing
+// fields while the exception propagates. So messages have the full path, and valid files cause no overhead.
 #pragma once
 
 #include <cmath>
@@ -13,9 +13,9 @@
 
 namespace pictura {
 
-/// Fault of a field; to_error() converts it to an Error.
+/// Exception for a fault of a field; to_error() converts it to an Error.
 struct FieldError {
-  std::string path;    // "tracks[4].states[17].center_x", or empty: the record itself
+  std::string path;    // "tracks[4].states[17].center_x", or empty for the record itself
   std::string reason;  // "expected a finite number, got nan"
 };
 
@@ -30,7 +30,7 @@ template <typename... Args>
   throw FieldError{std::string(field), fmt::format(format, std::forward<Args>(args)...)};
 }
 
-/// Runs work(), and prefixes the path of a FieldError in it with "NAME.".
+/// Returns work(). If it throws FieldError, prefixes the error's path with "NAME.".
 template <typename Work>
 auto within(std::string_view name, Work&& work) {
   try {
@@ -42,7 +42,7 @@ auto within(std::string_view name, Work&& work) {
   }
 }
 
-/// Runs work(), and prefixes the path of a FieldError in it with "NAME[INDEX].".
+/// Returns work(). If it throws FieldError, prefixes the error's path with "NAME[INDEX].".
 template <typename Work>
 auto within(std::string_view name, std::size_t index, Work&& work) {
   try {
@@ -54,7 +54,7 @@ auto within(std::string_view name, std::size_t index, Work&& work) {
   }
 }
 
-/// Returns the number, which must be finite and at most `largest` in magnitude. Throws FieldError.
+/// Returns the number. Throws FieldError if it is not finite or exceeds `largest` in magnitude.
 inline double checked_number(std::string_view field, double value, double largest = 1e9) {
   if (!std::isfinite(value)) fail_field(field, "expected a finite number, got {}", value);
   if (std::abs(value) > largest) {

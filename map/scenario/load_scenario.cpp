@@ -20,7 +20,7 @@ namespace pictura {
 
 namespace fs = std::filesystem;
 
-/// Ids of a TFRecord file's records, which are slow to find.
+/// Ids of the records of a TFRecord file. They are cached, because finding them is slow.
 struct ShardIds {
   std::vector<std::string> of_records;
 };
@@ -39,7 +39,8 @@ SceneFormat format_of(std::string_view path) {
   if (name.ends_with(".json")) return SceneFormat::gpudrive;
   if (name.ends_with(".bin")) return SceneFormat::pufferdrive;
   if (name.ends_with(kSceneFileEnding)) return SceneFormat::own;
-  // Shards of the dataset are named NAME.tfrecord-00000-of-00150; GPUDrive's names of JSON files begin with tfrecord.
+  // Files of WOMD are named NAME.tfrecord-00000-of-00150. GPUDrive's JSON files, which are tested above, have names
+  // that begin with tfrecord.
   if (name.find(kShard) != std::string::npos) return SceneFormat::womd;
   return SceneFormat::none;
 }
@@ -48,7 +49,7 @@ struct SceneName {
   std::string path, selector;
 };
 
-/// Splits a name at #. Names of existing files may contain #.
+/// Splits a name at its last #, unless a file has the whole name.
 SceneName split(std::string_view name) {
   std::error_code error;
   const std::size_t mark = name.rfind('#');
@@ -68,13 +69,14 @@ ShardIds scan_ids(const womd::ByteSource& file, const std::vector<womd::RecordPl
     try {
       id = womd::scan_scenario_id(file, place);
     } catch (const FieldError&) {
-      // Reading the record reports its fault.
+      // The fault is reported when the record is read.
     }
   }
   return ids;
 }
 
-/// Returns the ids of a shard's records, cached while the records have the same lengths and checksums.
+/// Returns the ids of the records of a TFRecord file. They are cached while the lengths and checksums of the records do
+/// not change.
 ShardIds find_ids(const std::string& path, const womd::ByteSource& file,
                   const std::vector<womd::RecordPlace>& records) {
   const std::string folder = cache_folder("scenes");
@@ -93,7 +95,7 @@ ShardIds find_ids(const std::string& path, const womd::ByteSource& file,
       if (ids.of_records.size() == records.size()) return ids;
     }
   } catch (const Error&) {
-    // Stale or damaged files are replaced.
+    // A stale or damaged cache file is replaced.
   }
   ShardIds ids = scan_ids(file, records);
   write_to_cache(cached, encode_cached(key, [&](FieldWriter* writer) { writer->put(ids); }));
@@ -194,7 +196,7 @@ SceneRef find_scene(const std::string& name) {
   if (const std::optional<uint64_t> number = parse_unsigned(wanted.selector)) {
     if (*number < index.scenes.size()) return index.scenes[*number];
   }
-  // The data after the last whole record may have been the requested record.
+  // The message contains the first fault, because the requested record may be in an omitted end of the file.
   fail_usage("{}: expected #0 to #{} or the id of one of its scenes, got #{}{}", wanted.path, index.scenes.size() - 1,
              wanted.selector, index.faults.empty() ? "" : fmt::format(" ({})", index.faults.front()));
 }

@@ -1,5 +1,5 @@
-// A scene as its file has it, in the file's coordinates and in double precision. All readers fill this structure and
-// make_scenario() converts it, so that each rule of conversion exists once.
+// A recorded scene with the contents of its file, in the file's coordinates and in double precision. All readers fill
+// this structure, and make_scenario() converts it, so that each rule of conversion exists only once.
 #pragma once
 
 #include <cstdint>
@@ -20,13 +20,13 @@ using LoggedPoints = std::vector<Eigen::Vector3d>;
 
 enum class LoggedLaneType : uint8_t { undefined, freeway, surface, bike, bus };
 
-/// Points [begin, end] of a lane's centre line along which `feature` is the lane's border.
+/// Part of a lane's border: `feature` is the border along the points [begin, end] of the lane's centre line.
 struct LoggedBoundary {
   int32_t begin = 0, end = 0;
   int64_t feature = 0;  // id of a line or an edge
 };
 
-/// Points [begin, end] of a lane's centre line along which `lane` runs beside it.
+/// A neighbour of a lane: `lane` is beside the points [begin, end] of the lane's centre line.
 struct LoggedNeighbor {
   int32_t begin = 0, end = 0;
   int64_t lane = 0;
@@ -35,7 +35,7 @@ struct LoggedNeighbor {
 struct LoggedLane {
   int64_t id = 0;
   LoggedLaneType type = LoggedLaneType::undefined;
-  std::optional<LaneType> map_type;  // overrides `type` if a program states the scene
+  std::optional<LaneType> map_type;  // overrides `type` if a program wrote the scene
   double speed_limit_mps = 0;        // 0: unknown
   bool interpolating = false;        // connects two lanes in a junction
   LoggedPoints points;
@@ -55,7 +55,7 @@ enum class LoggedLineType : uint8_t {
   solid_single_yellow,
   solid_double_yellow,
   passing_double_yellow,
-  dash_white,  // one dash as long as the line
+  dash_white,  // a single dash as long as the line
   dash_yellow,
 };
 
@@ -82,7 +82,7 @@ struct LoggedPolygon {
 };
 
 struct LoggedState {
-  Eigen::Vector3d center_m{0, 0, 0};  // centre of the box; of its bottom face if LoggedScene::is_authored
+  Eigen::Vector3d center_m{0, 0, 0};  // centre of the box, or of its bottom face if LoggedScene::is_authored
   double heading_rad = 0;
   double velocity_x_mps = 0, velocity_y_mps = 0;
   double length_m = 0, width_m = 0, height_m = 0;
@@ -96,7 +96,7 @@ struct LoggedTrack {
   std::vector<LoggedState> states;  // [num_steps]
 };
 
-/// A light for some lanes. Without a stop line of its own, it gets one across the lanes' starts.
+/// A traffic light for some lanes. If it has no stop line, it gets a stop line across the starts of its lanes.
 struct LoggedLight {
   std::vector<int64_t> lanes;
   bool has_stop_line = false;
@@ -104,7 +104,7 @@ struct LoggedLight {
   std::vector<RecordedLightState> states;  // [num_steps]
 };
 
-/// Names of a reader's fields in messages.
+/// Names that messages use for the fields of a file format.
 struct LoggedNames {
   const char* tracks = "tracks";
   const char* features = "map_features";
@@ -122,20 +122,20 @@ struct LoggedScene {
   std::vector<std::pair<int32_t, int32_t>> predictions;  // index of a track, difficulty
   std::vector<LoggedLane> lanes;
   std::vector<LoggedLine> lines;
-  std::vector<LoggedEdge> edges;  // with the road on their left
+  std::vector<LoggedEdge> edges;  // the road is on their left
   std::vector<LoggedPolygon> crosswalks;
   std::vector<LoggedStopSign> stop_signs;
   std::vector<LoggedLight> lights;
   bool has_links = true;  // if false, lanes are linked where their ends meet
-  /// Whether a program states the scene, rather than a recording's file. Then nothing is inferred: types of lanes,
-  /// directions of links, sides and gaps of edges, and the grouping of lights are as stated. Points are rounded first,
-  /// so that scene_of_scenario() of a scenario gives the same scenario again.
+  /// Whether a program wrote the scene, so that it does not come from a recording. Then nothing is inferred: types of
+  /// lanes, directions of links, sides and gaps of edges, and the grouping of lights do not change. Points are rounded
+  /// first. So the scenario does not change if scene_of_scenario() and make_scenario() are applied to it.
   bool is_authored = false;
   double tolerance_m = 0.02;                // maximum deviation of thinned polylines; 0: all points are kept
   std::optional<Eigen::Vector3d> origin_m;  // origin of the map; by default the centre of lanes and edges
   std::vector<ConversionNote> notes;
 
-  /// Counts an occurrence of `what`, and keeps the place of the first.
+  /// Counts an occurrence of `what`, and records the place of the first occurrence.
   void note(const std::string& what, const std::string& place) {
     for (ConversionNote& known : notes) {
       if (known.what == what) {
@@ -147,15 +147,15 @@ struct LoggedScene {
   }
 };
 
-/// Converts a scene to a scenario. Throws Error "SOURCE: FIELD: expected ..., got ..." when a valid state or a point of
-/// the map is not finite or lies beyond 10 km of the scene's centre. Also throws Error when there is no lane of two
-/// points or no track, and when the map would need more points than the limit for scenes.
+/// Converts a scene to a scenario. Throws Error "SOURCE: FIELD: expected ..., got ..." if a valid state or a point of
+/// the map is not finite or is more than 10 km from the scene's centre. Also throws Error if there is no lane of two
+/// points, if there is no track, or if the map would need more points than the limit for scenes.
 Scenario make_scenario(LoggedScene scene);
 
 /// Inverse of make_scenario(), except for data that a LoggedScene cannot hold: walls, parking spaces, painted stop
-/// lines, signs other than stop signs, widths and colours of marks other than white and yellow, the lights of the map
-/// itself, and SavedMotion. A double line becomes two stripes, a broken line its dashes. Lanes have the ids of the file
-/// if these are unique, else their indices.
+/// lines, signs other than stop signs, widths of marks, marks that are neither white nor yellow, the traffic lights of
+/// the map itself, and SavedMotion. A double line becomes two stripes, and a broken line becomes its dashes. Lanes have
+/// the ids of the file if these are unique, else their indices.
 LoggedScene scene_of_scenario(const Scenario& scenario);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Lanes of a scenario: centre lines, widths from borders, types, links, neighbours, junctions.
+// Makes the lanes of a scenario: centre lines, widths from borders, types, links, neighbours and junctions.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,10 +16,11 @@ namespace pictura::conversion {
 
 namespace {
 
-constexpr double kLaneWidth_m = 3.5, kBikeLaneWidth_m = 1.8;        // defaults for unknown widths
-constexpr double kMinHalfWidth_m = 0.5, kMaxHalfWidth_m = 5.0;      // a border farther away belongs to another lane
-constexpr int32_t kWidthStride = 5;                                 // points of a lane between measurements
-constexpr double kMeetingEnds_m = 0.1, kMeetingHeading_rad = 1.05;  // limits for ends of lanes that continue each other
+constexpr double kLaneWidth_m = 3.5, kBikeLaneWidth_m = 1.8;    // defaults for unknown widths
+constexpr double kMinHalfWidth_m = 0.5, kMaxHalfWidth_m = 5.0;  // farther borders belong to other lanes
+constexpr int32_t kWidthStride = 5;                             // points of a lane between measurements
+// Maximum differences at the ends where a lane continues another lane.
+constexpr double kMeetingEnds_m = 0.1, kMeetingHeading_rad = 1.05;
 constexpr double kWideGap_m = 1.0;
 constexpr float kMeetingLevel_m = 1.0f;
 
@@ -36,7 +37,7 @@ double distance_to(const Eigen::Vector2d& p, const LoggedPoints& line) {
   return best;
 }
 
-/// Measures widths from the borders to which lanes refer.
+/// Measures the widths of lanes from the borders to which lanes refer.
 class LaneWidthEstimator {
  public:
   explicit LaneWidthEstimator(Conversion* conversion) : conversion_(conversion) {
@@ -44,7 +45,7 @@ class LaneWidthEstimator {
     for (const LoggedEdge& edge : conversion->scene.edges) features_.emplace(edge.id, &edge.points);
   }
 
-  /// Returns the width at every point of a lane; nothing if no border is known.
+  /// Returns the width at every point of a lane, or nothing if no border is known.
   std::optional<std::vector<double>> measure(const LoggedLane& lane) {
     if (!lane.widths_m.empty()) return lane.widths_m;
     std::map<std::size_t, double> left, right;  // half widths by point
@@ -81,7 +82,7 @@ class LaneWidthEstimator {
     }
   }
 
-  /// Interpolates linearly between known points; constant beyond them.
+  /// Interpolates linearly between points with known widths. Beyond them, the width is constant.
   static std::vector<double> filled(const std::map<std::size_t, double>& known, std::size_t count) {
     std::vector<double> widths(count);
     auto next = known.begin();
@@ -108,8 +109,8 @@ double mean_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-/// Sets the widths of lanes without borders: the mean width of neighbours, else the widths of the lanes before and
-/// after, else a constant.
+/// Sets the widths of lanes without borders. The width is the mean width of neighbours if known, else it follows from
+/// the lanes before and after, else it is a constant.
 void complete_widths(Conversion* conversion, std::vector<std::optional<std::vector<double>>>* widths_inout) {
   const LoggedScene& scene = conversion->scene;
   std::unordered_map<int64_t, const std::vector<double>*> measured;
@@ -166,7 +167,7 @@ LaneType type_of(LoggedLaneType type) {
   return LaneType::other;
 }
 
-/// The links that the file states, from either side.
+/// Returns the links of the file. Either of the two linked lanes may contain the link.
 LaneLinks given_links(Conversion* conversion) {
   LoggedScene& scene = conversion->scene;
   const RoadMap& map = conversion->out->map;
@@ -202,7 +203,7 @@ LaneLinks given_links(Conversion* conversion) {
   return links;
 }
 
-/// Links between lanes of which one ends where the other starts, in about its direction.
+/// Returns links from each lane to the lanes that start where it ends, in about the same direction.
 LaneLinks meeting_links(Conversion* conversion) {
   const RoadMap& map = conversion->out->map;
   std::vector<Aabb2> starts;
@@ -229,7 +230,7 @@ LaneLinks meeting_links(Conversion* conversion) {
   return links;
 }
 
-/// The neighbour beside which the lane runs longest, or -1.
+/// Returns the neighbour with the longest common part, or -1.
 int32_t longest_neighbor(Conversion* conversion, const std::vector<LoggedNeighbor>& neighbors, int32_t own) {
   std::map<int32_t, int64_t> lengths;
   conversion->count_work(10 * neighbors.size());
@@ -245,7 +246,7 @@ int32_t longest_neighbor(Conversion* conversion, const std::vector<LoggedNeighbo
   return best;
 }
 
-/// Sets neighbours that refer to each other.
+/// Sets the neighbours of lanes. Two lanes become neighbours if each refers to the other.
 void set_neighbors(Conversion* conversion) {
   RoadMap& map = conversion->out->map;
   std::vector<int32_t> left(map.lanes.size()), right(map.lanes.size());
@@ -258,7 +259,7 @@ void set_neighbors(Conversion* conversion) {
     const int32_t other = left[i];
     if (other < 0 || right[other] != static_cast<int32_t>(i)) continue;
     if (map.lanes[i].type != map.lanes[other].type) continue;
-    // A ring of neighbours has no leftmost lane.
+    // Skips neighbours that would form a ring, because a ring has no leftmost lane.
     int32_t leftmost = other;
     while (leftmost >= 0 && leftmost != static_cast<int32_t>(i)) {
       leftmost = map.lanes[leftmost].left_neighbor;
@@ -270,7 +271,7 @@ void set_neighbors(Conversion* conversion) {
   }
 }
 
-/// Sets the type of lanes without a stated type to that of the linked lanes, where these agree.
+/// Sets the type of each lane without a type to the type of the linked lanes, if all of them have the same type.
 void infer_types(RoadMap* map) {
   std::vector<LaneType> types;
   for (const Lane& lane : map->lanes) {

@@ -1,4 +1,4 @@
-// Drawn parts of a scenario's map besides lanes: road edges, marks, crosswalks and signs; then its counts.
+// Makes the drawn parts of a scenario's map: road edges, marks, crosswalks and signs. Then counts the map's facts.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,8 +15,8 @@ namespace {
 
 constexpr float kMarkWidth_m = 0.15f;
 constexpr double kStripeOffset_m = 0.15;  // distance of the two stripes of a double line from its middle
-/// Minimum length of gaps. Edges are dense; longer pieces are gaps of the recording, which are kept unless they cross a
-/// lane.
+/// Minimum length of a gap. Edges have dense points, so a longer piece is a gap in the recording. The edge is
+/// interrupted there only if the piece crosses a lane.
 constexpr double kJump_m = 2.0;
 constexpr float kNearLane_m = 6.0f;
 constexpr int kMinVotes = 20;
@@ -33,7 +33,7 @@ struct NearLane {
   Vec2 to_point, direction;
 };
 
-/// Returns the nearest lane segment within reach, on the level of p.
+/// Returns the nearest lane segment within `reach_m` of p, on the level of p.
 NearLane nearest_lane(Conversion* conversion, const LanePieces& lanes, Vec3 p, float reach_m) {
   NearLane best;
   visit_items(lanes.grid.view(), box_around(p, reach_m), [&](std::size_t item) {
@@ -49,7 +49,7 @@ NearLane nearest_lane(Conversion* conversion, const LanePieces& lanes, Vec3 p, f
   return best;
 }
 
-/// Whether most edges near lanes have the lane on their right, contrary to the convention.
+/// Whether most edges near lanes have the lane on their right. By convention, the road is on the left of edges.
 bool are_reversed(Conversion* conversion, const LanePieces& lanes, const std::vector<std::vector<CurvePoint>>& lines) {
   int left = 0, right = 0;
   for (const std::vector<CurvePoint>& line : lines) {
@@ -67,7 +67,7 @@ bool are_reversed(Conversion* conversion, const LanePieces& lanes, const std::ve
 
 bool crosses_a_lane(Conversion* conversion, const LanePieces& lanes, Vec3 a, Vec3 b) {
   const Aabb2 box{{min_of(a.x, b.x), min_of(a.y, b.y)}, {max_of(a.x, b.x), max_of(a.y, b.y)}};
-  // Long pieces pass through many cells.
+  // A long piece passes through many cells, which count as work.
   const double cells = ((box.high.x - box.low.x) / kCell_m + 1) * ((box.high.y - box.low.y) / kCell_m + 1);
   conversion->count_work(static_cast<std::size_t>(cells));
   bool crosses = false;
@@ -82,7 +82,7 @@ bool crosses_a_lane(Conversion* conversion, const LanePieces& lanes, Vec3 a, Vec
 void append_marking(Conversion* conversion, std::vector<CurvePoint> points, MarkColor color, bool broken) {
   RoadMap* map = &conversion->out->map;
   if (conversion->scene.is_authored) {
-    // Rounded so that the stripe or dash can be stated as a line.
+    // Points are rounded so that scene_of_scenario() can return the stripe or dash as a line.
     for (CurvePoint& point : points) point.position_m = conversion->rounded(point.position_m);
     points = cut_into_pieces(conversion, points, "a stripe or dash");
   }
@@ -106,7 +106,7 @@ void make_edges(Conversion* conversion) {
   LoggedScene& scene = conversion->scene;
   RoadMap& map = conversion->out->map;
   const LanePieces lanes = segments_of(map, is_driven);
-  // Parts between jumps that cross a lane.
+  // Parts of edges. Gaps that cross a lane separate them.
   std::vector<std::vector<CurvePoint>> lines;
   for (const LoggedEdge& edge : scene.edges) {
     const std::string place = fmt::format("edge {}", edge.id);
@@ -177,7 +177,7 @@ void make_markings(Conversion* conversion) {
         append_dashes(conversion, right(), MarkColor::yellow);
         break;
       case LoggedLineType::passing_double_yellow:
-        // The format does not contain the side on which passing is allowed.
+        // Passing is allowed on one side only, but the format does not contain the side.
         solid(left(), MarkColor::yellow);
         append_dashes(conversion, right(), MarkColor::yellow);
         break;

@@ -1,4 +1,4 @@
-// Order of the stages, and their shared parts; then tracks and lights.
+// Runs the stages of the conversion. Contains the functions that stages share, and the stages for tracks and lights.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -14,9 +14,9 @@ namespace conversion {
 
 namespace {
 
-// Stop points this near, of lanes that start in about one direction, are one light's.
+// Maximum differences between stop points, and between headings at the starts of lanes, of lanes that share one light.
 constexpr double kSameStopPoint_m = 0.5, kSameHeading_rad = 0.5;
-constexpr double kAuthoredPiece_m = 9.99;  // used instead of kMaxPiece_m
+constexpr double kAuthoredPiece_m = 9.99;  // used instead of kMaxPiece_m for scenes that a program wrote
 
 float wrapped(double heading_rad) { return static_cast<float>(std::remainder(heading_rad, 2 * std::numbers::pi)); }
 
@@ -42,7 +42,8 @@ std::vector<CurvePoint> cut_into_pieces(Conversion* conversion, const std::vecto
         conversion->scene.note("points that repeat the one before left out", what);
         continue;
       }
-      // Rounding must not make a piece so long that it would be cut again.
+      // Pieces are slightly shorter than allowed, because rounding must not make a piece so long that it would be cut
+      // again.
       const double piece_m =
           conversion->scene.is_authored && way_m > kMaxPiece_m ? kAuthoredPiece_m : double{kMaxPiece_m};
       const int pieces = static_cast<int>(std::ceil(way_m / piece_m - kPieceRounding));
@@ -71,12 +72,12 @@ std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& po
   if (line.size() < 2) return {};
   if (scene.tolerance_m > 0) {
     std::vector<CurvePoint> thinned;
-    // Thinning tests each point against the other points of its piece; a straight piece has about twenty points.
+    // Thinning tests each point against the other points of its piece. A straight piece has about twenty points.
     conversion->count_work(line.size() * 20);
     for (const std::size_t index : thin_polyline(line, scene.tolerance_m, kMaxPiece_m)) thinned.push_back(line[index]);
     line = std::move(thinned);
   }
-  // The ends of omitted parts may be duplicates.
+  // Removes duplicates. After points have been omitted, points at both ends of the omitted part may be duplicates.
   if (scene.is_authored) line = cut_into_pieces(conversion, line, what);
   return line;
 }
@@ -147,7 +148,7 @@ void make_tracks(Conversion* conversion) {
       }
       Eigen::Vector3d p = conversion->rounded(conversion->from_origin(state.center_m));
       check_radius(*conversion, fmt::format("{}: step {}", place, step), p);
-      // Recorded sizes vary along a track: the bottom face is below the centre by half of the height at that step.
+      // Recorded sizes vary along a track, so the bottom face is half of the current step's height below the centre.
       if (!scene.is_authored) p.z() -= 0.5 * (state.height_m > 0 ? state.height_m : last->height_m);
       out.states.push_back({to_vec3(p),
                             wrapped(state.heading_rad),
@@ -182,15 +183,15 @@ void make_tracks(Conversion* conversion) {
 
 namespace {
 
-// One light, or several lights whose lines coincide and that always have the same state.
+// A light, or several lights whose stop lines coincide and that always have equal states.
 struct FoundLight {
   std::vector<int32_t> lanes;
   const LoggedLight* light;
   double heading_rad;  // heading of the controlled traffic
-  LanePoint start;     // start of its widest lane
+  LanePoint start;     // start of the light's widest lane
 };
 
-// Returns the lanes of a light that it may control.
+// Returns the lanes of a light, except lanes that the map does not have and bike lanes.
 std::vector<int32_t> held_lanes(const LoggedLight& light, Conversion* conversion) {
   LoggedScene& scene = conversion->scene;
   std::vector<int32_t> lanes;
@@ -208,7 +209,7 @@ std::vector<int32_t> held_lanes(const LoggedLight& light, Conversion* conversion
 }
 
 FoundLight find_light(const RoadMap& map, const LoggedLight& light, std::vector<int32_t> lanes) {
-  // Mean direction of traffic at the line: of the preceding lanes, else of the lane itself.
+  // Mean direction of traffic at the stop line: of the preceding lanes if there are any, else of the lane itself.
   Eigen::Vector2d direction(0, 0);
   const auto add_heading = [&direction](double heading) {
     direction += Eigen::Vector2d(std::cos(heading), std::sin(heading));
@@ -234,7 +235,7 @@ bool are_one(const FoundLight& a, const FoundLight& b) {
          std::abs(std::remainder(a.heading_rad - b.heading_rad, 2 * std::numbers::pi)) < kSameHeading_rad;
 }
 
-// Returns the light with its line from left to right, without its lanes.
+// Returns the light with its stop line from left to right, but without its lanes.
 RecordedLight recorded_light(const FoundLight& found, const Conversion& conversion) {
   RecordedLight recorded;
   recorded.stop_heading_rad = wrapped(found.heading_rad);

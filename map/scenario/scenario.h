@@ -1,6 +1,6 @@
-// Scenario: a recorded piece of traffic, for any file format: a map, the tracks of all road users, and the recorded
-// lights. Positions are in the coordinates of its map. docs/reference/scenario.md describes the derivation of each
-// part.
+// Scenario: recorded traffic from any file format. It consists of a map, the tracks of all road users, and the recorded
+// traffic lights. Positions are in the coordinates of the scenario's map. docs/reference/scenario.md describes the
+// derivation of each part.
 #pragma once
 
 #include <cstdint>
@@ -24,13 +24,13 @@ struct TrackState {
   Vec2 velocity_mps;
 };
 
-/// Additional simulator state of a saved run, so that a replay has the same bits.
+/// Additional simulator state of a saved simulation, so that a replay is bitwise identical.
 struct SavedMotion {
-  Vec3 reference_m;     // reference point of its class
+  Vec3 reference_m;     // reference point of the road user's class
   float speed_mps = 0;  // signed, along the heading
 };
 
-/// A file's statement of which controller should drive a track.
+/// The file's statement about the controller of a track.
 enum class RecordedControl : uint8_t {
   unstated,
   controllable,  // a policy may drive the track
@@ -44,11 +44,11 @@ struct RecordedTrack {
   TrackType type = TrackType::unset;
   RecordedControl control = RecordedControl::unstated;
   float length_m = 0, width_m = 0, height_m = 0;  // size in the last valid state
-  int32_t first_valid = 0, last_valid = 0;        // steps; gaps in between are possible
+  int32_t first_valid = 0, last_valid = 0;        // steps; between them, the track may have gaps
   int32_t num_valid = 0;                          // at least one
 };
 
-/// State of a light as recorded, with WOMD's names.
+/// Recorded state of a traffic light, with the names of the Waymo Open Motion Dataset.
 enum class RecordedLightState : uint8_t {
   none,  // unknown, off, or not visible at that step
   arrow_stop,
@@ -62,11 +62,11 @@ enum class RecordedLightState : uint8_t {
 };
 const char* to_string(RecordedLightState state);
 
-/// Lanes that one light controls, with its stop line across their starts.
+/// A recorded traffic light: the lanes that it controls, and its stop line across the starts of these lanes.
 struct RecordedLight {
   Vec3 stop_a_m, stop_b_m;     // left end first as seen by traffic
   float stop_heading_rad = 0;  // travel direction of the controlled traffic
-  IndexRange lanes;            // Scenario::light_lanes
+  IndexRange lanes;            // in Scenario::light_lanes
 };
 
 /// A track that a file marks for prediction.
@@ -75,11 +75,11 @@ struct PredictedTrack {
   int32_t difficulty = 0;
 };
 
-/// A kind of omission or change during conversion from the file.
+/// A kind of omission or change that was made during the conversion from the file.
 struct ConversionNote {
   std::string what;   // "lanes of a single point left out"
   int32_t count = 0;  // number of occurrences
-  std::string first;  // first place, such as "lane 117"
+  std::string first;  // place of the first occurrence, such as "lane 117"
 };
 
 struct Scenario {
@@ -87,7 +87,7 @@ struct Scenario {
   std::string format;  // "womd", "gpudrive", "pufferdrive v1", ...
   float dt_s = 0.1f;
   int32_t num_steps = 0;
-  int32_t current_step = 0;  // last step of the history given to predictors
+  int32_t current_step = 0;  // last step of the history that predictors receive
   int32_t sdc_track = -1;    // the self-driving car; -1: unknown
   RoadMap map;
   std::vector<RecordedTrack> tracks;
@@ -115,23 +115,23 @@ struct Scenario {
   size_t first_of(int32_t item) const { return static_cast<size_t>(item) * static_cast<size_t>(num_steps); }
 };
 
-/// Limits that importers and validate() enforce.
+/// Maximum numbers of steps and tracks, which importers and validate() enforce.
 constexpr int32_t kMaxScenarioSteps = 10'000, kMaxScenarioTracks = 65'536;
 
-/// Throws Error naming the element unless the map, every index, every size and every state are valid, and the tracks'
-/// summaries agree with their states.
+/// Throws Error, which names the element, if the map, an index, a size or a state is invalid, or if the summary of a
+/// track does not agree with its states.
 void validate(const Scenario& scenario);
 
-/// Returns the first bitwise difference of two scenarios, as a path like "tracks[3].length_m: 4 and 5"; empty if the
-/// scenarios are equal.
+/// Returns the first bitwise difference of two scenarios, such as "tracks[3].length_m: 4 and 5". Returns an empty
+/// string if the scenarios are equal.
 std::string first_difference(const Scenario& a, const Scenario& b);
 
 /// Counts that `pictura map` prints.
 struct ScenarioFacts {
   int32_t vehicles = 0, pedestrians = 0, cyclists = 0, others = 0;
-  int32_t moving_vehicles = 0;        // last position at least kMovingTrack_m from the first
-  int32_t tracks_with_gaps = 0;       // absent between valid states
-  int32_t recorded_light_states = 0;  // light-steps with a state
+  int32_t moving_vehicles = 0;        // vehicles for which is_moving() is true
+  int32_t tracks_with_gaps = 0;       // tracks with invalid states between valid states
+  int32_t recorded_light_states = 0;  // number of steps with a known state, summed over lights
 };
 constexpr float kMovingTrack_m = 2.0f;
 ScenarioFacts facts_of(const Scenario& scenario);

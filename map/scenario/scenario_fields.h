@@ -1,5 +1,5 @@
-// Field lists of Scenario and of its elements, for its cache and for comparisons, as map_fields.h lists RoadMap's
-// fields; and the limits that importers share with validate().
+// Lists of the fields of Scenario and its elements, for the cache of scenes and for comparisons. map_fields.h lists the
+// fields of RoadMap in the same way. Also contains the limits that importers share with validate().
 #pragma once
 
 #include "pictura/map/field_difference.h"
@@ -17,7 +17,7 @@ PICTURA_FIELDS(ConversionNote, what, count, first)
 PICTURA_FIELDS(Scenario, id, format, dt_s, num_steps, current_step, sdc_track, map, tracks, states, valid, driven,
                objects_of_interest, tracks_to_predict, lights, light_lanes, light_states, notes)
 
-/// Maximum distance of all positions from a scene's origin; recordings are some hundred metres across.
+/// Maximum distance of positions from a scene's origin. Recordings extend over some hundred metres.
 constexpr float kMaxScenarioRadius_m = 1e4f;
 constexpr float kMaxTrackSize_m = 100.0f;
 

@@ -1,5 +1,5 @@
-// Scenes as binary files: a header that identifies the importers and the source, then every field. Stale or damaged
-// files are rejected. Used for cached imports and for the files of scene_file.h.
+// Binary files of scenes. A header identifies the importers and the source, and all fields follow. Stale or damaged
+// files are rejected. The cache of imported scenes and the scene files of scene_file.h use this format.
 #pragma once
 
 #include <array>
@@ -14,32 +14,35 @@
 
 namespace pictura {
 
-/// Inputs that determine a scene, besides this build of the importers. Equal keys mean equal scenes.
+/// Inputs that determine a scene. For one build of the importers, equal keys mean equal scenes.
 struct SceneCacheKey {
   static constexpr int64_t kIndex = -2;
-  uint64_t content = 0;  // hash of the scene's bytes; for an index, of the records' lengths and checksums
-  int64_t record = 0;    // index in the file; -1: the file is the scene; kIndex: the list of its records
+  // Hash of the scene's bytes, or of the lengths and checksums of the records for an index.
+  uint64_t content = 0;
+  // Index of the record in the file; -1 if the file is the scene, kIndex for the list of the file's records.
+  int64_t record = 0;
 };
 
-/// Kind of a file: the beginning of its header.
+/// Kind of a file, with the beginning of its header.
 struct FieldFileKind {
   std::array<char, 8> magic{};
   uint32_t version = 1;    // version of the header
-  uint64_t layout = 0;     // hash of the description of the payload's layout
+  uint64_t layout = 0;     // hash of the text that describes the payload's layout
   const char* other = "";  // reason in messages about a file of another layout
 };
 
-/// Encodes a header of magic, version, byte order, layout, key, size and CRC-32C, followed by the bytes that put()
-/// writes.
+/// Encodes a header, followed by the bytes that put() writes. The header contains magic bytes, version, byte order,
+/// layout, key, size and CRC-32C checksum.
 std::string encode_fields(const FieldFileKind& kind, const SceneCacheKey& key,
                           const std::function<void(FieldWriter*)>& put);
 
-/// Decodes bytes by get(), which must read all of the payload. Throws Error "NAME: reason" when the bytes are foreign,
-/// of another byte order, version or layout, truncated, stale or damaged.
+/// Decodes bytes by get(), which must read the whole payload. Throws Error "NAME: reason" if the bytes are of another
+/// file type, byte order, version or layout, or are truncated, stale or damaged.
 void decode_fields(std::string_view bytes, const FieldFileKind& kind, const SceneCacheKey& key, const std::string& name,
                    const std::function<void(FieldReader*)>& get);
 
-/// Variants for the cache's kind of file, which is stale when the importers have changed.
+/// Variants of encode_fields() and decode_fields() for files of the cache. Such files are stale after the importers
+/// have changed.
 std::string encode_cached(const SceneCacheKey& key, const std::function<void(FieldWriter*)>& put);
 
 void decode_cached(std::string_view bytes, const SceneCacheKey& key, const std::string& name,
@@ -47,7 +50,7 @@ void decode_cached(std::string_view bytes, const SceneCacheKey& key, const std::
 
 std::string encode_scenario(const Scenario& scenario, const SceneCacheKey& key);
 
-/// Decodes and validates a scenario. Throws as decode_cached() does. Memory is bounded by a few times the size of the
+/// Decodes and validates a scenario. Throws as decode_cached() does. Uses memory of at most a few times the size of the
 /// bytes.
 Scenario decode_scenario(std::string_view bytes, const SceneCacheKey& key, const std::string& name);
 

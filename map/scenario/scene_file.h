@@ -1,5 +1,5 @@
-// Native scene files, *.scenario: the exact states that a simulator drove. Importers read other projects' files, derive
-// a map from their contents and round; native files hold the map and every state unchanged.
+// Native scene files, *.scenario, with the exact states that a simulator computed. They contain the map and every state
+// unchanged. Importers of other formats, in contrast, derive a map and round states.
 #pragma once
 
 #include <string>
@@ -13,14 +13,15 @@ namespace pictura {
 
 constexpr std::string_view kSceneFileEnding = ".scenario";
 
-/// File kind for encode_fields() and decode_fields(), used with an empty key.
+/// Returns the file kind for encode_fields() and decode_fields(). Native files use it with an empty key.
 FieldFileKind scene_file_kind();
 
-/// Writes a file completely or not at all. Throws UsageError for a name without the ending, and Error naming the file.
+/// Writes a file, completely or not at all. Throws UsageError for a name without the ending kSceneFileEnding, and
+/// Error, which names the file, if it cannot be written.
 void write_scene_file(const std::string& path, const Scenario& scenario);
 
-/// Parses and validates a file's bytes; `name` appears in messages. Throws Error "NAME: reason" when the bytes are
-/// foreign, truncated or damaged, or written by a version whose scenes have other fields.
+/// Parses and validates the bytes of a file. `name` appears in messages. Throws Error "NAME: reason" if the bytes are
+/// of another file type, truncated, damaged, or written by a version whose scenes have other fields.
 Scenario parse_scene_file(std::string_view bytes, const std::string& name);
 
 }  // namespace pictura

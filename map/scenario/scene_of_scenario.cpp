@@ -1,4 +1,4 @@
-// Inverse of make_scenario(): a scenario as a scene that a program could have stated.
+// Inverse of make_scenario(): converts a scenario to a scene that a program could have written.
 #include <algorithm>
 #include <charconv>
 #include <numbers>
@@ -85,7 +85,7 @@ class SceneBuilder {
         state.valid = valid[step] != 0;
         if (!state.valid) continue;
         state.center_m = in_file(states[step].position_m);
-        // The float next to pi exceeds pi and would be wrapped.
+        // The float that is nearest to pi exceeds pi, and would be wrapped to -pi.
         state.heading_rad = std::clamp(double{states[step].heading_rad}, -std::numbers::pi, std::numbers::pi);
         state.velocity_x_mps = double{states[step].velocity_mps.x};
         state.velocity_y_mps = double{states[step].velocity_mps.y};
@@ -138,7 +138,7 @@ class SceneBuilder {
     }
   }
 
-  /// Joins consecutive pieces; edges of a RoadMap have the road on their right.
+  /// Joins consecutive edges, and reverses them, because the edges of a RoadMap have the road on their right.
   void state_edges() {
     for (std::size_t i = 0; i < map_.road_edges.size(); ++i) {
       const RoadEdge& edge = map_.road_edges[i];
