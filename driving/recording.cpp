@@ -19,7 +19,7 @@ namespace pictura {
 
 namespace {
 
-/// Returns the observations of one slot.
+/// Selects the observations of one slot.
 ObservationView of_slot(const ObservationView& all, size_t slot) {
   ObservationView one;
 #define X(name, type, rows, features, part, comment) \
@@ -29,7 +29,7 @@ ObservationView of_slot(const ObservationView& all, size_t slot) {
   return one;
 }
 
-/// Quotes a word for shells.
+/// Returns a word, quoted for a shell if necessary.
 std::string quoted(const std::string& word) {
   constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=.,:/@%";
   if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
@@ -45,7 +45,7 @@ std::string quoted(const std::string& word) {
 }
 
 void report_file(const std::string& path, const Replay& replay) {
-  std::error_code none;  // receives the error of devices, which have no size
+  std::error_code none;  // set if the path is a device, which has no size
   const auto bytes = std::filesystem::file_size(path, none);
   print_message("{}: {} agents, {} steps{}\n", path, replay.num_agents, replay.num_frames - 1,
                 none ? "" : fmt::format(", {:.2f} MB", static_cast<double>(bytes) / 1e6));

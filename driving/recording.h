@@ -1,4 +1,4 @@
-// Records a driven world as a replay, with the policy's responses for the followed agent.
+// Records a simulated world as a replay, with the policy's responses for the followed agent.
 #pragma once
 
 #include <memory>
@@ -16,16 +16,16 @@ class PolicySession;
 struct DrivenWorld;
 
 struct RecordingOptions {
-  std::optional<int> followed;  // number of the followed agent; empty: resolve_followed() chooses it
+  std::optional<int> followed;  // number of the followed agent; if empty, resolve_followed() sets it
   bool cameras = false;
 };
 
 /// Sets the followed agent to the world's default agent (DrivenWorld::first_agent) if none was requested. Throws
-/// UsageError if the world lacks the requested agent.
+/// UsageError if the requested agent does not exist in the world.
 void resolve_followed(const DrivenWorld& world, RecordingOptions* options_inout);
 
-/// Driver of a recorded world, and the renderer of the driver's images. A controller has no session, and the cameras of
-/// its replays are the paper's.
+/// Driver of a recorded world, and the renderer of the driver's images. A controller (a driver that is not a policy)
+/// has no session. Its replays have the cameras of the paper (default RendererConfig).
 struct RecordedDriver {
   std::string policy;  // name or path, as requested
   PolicySession* session = nullptr;
@@ -34,17 +34,17 @@ struct RecordedDriver {
 
 /// Returns the renderer configuration of the policy's images, or of the paper's cameras for a controller.
 RendererConfig cameras_of(const RecordedDriver& driver);
-/// Returns the policy's response to an agent's present observation in the only world; empty if no policy drives or the
-/// agent is not active.
+/// Returns the policy's response to an agent's current observation in the only world. Returns nothing if the driver is
+/// not a policy or the agent is not active.
 std::optional<ReplayDecision> decision_of_agent(Simulator& simulator, const RecordedDriver& driver, int agent);
-/// Returns the origin of a replay: this process, its command and the driver.
+/// Returns the origin of a replay: this process's command and version, and the driver.
 ReplayOrigin origin_of(const RecordedDriver& driver);
 
 /// Records the only world of a simulator in host memory.
 class Recording final : public StepObserver {
  public:
-  /// Creates a recording. The simulator and the driver's objects must outlive it. Throws UsageError if the followed
-  /// agent does not exist.
+  /// Starts recording. The simulator and the driver's objects must outlive the recording. Throws UsageError if the
+  /// followed agent does not exist.
   Recording(Simulator& simulator, const RecordedDriver& driver, const RecordingOptions& options);
   ~Recording() override;
 
@@ -59,14 +59,16 @@ class Recording final : public StepObserver {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Writes a replay to `path`, and reports the file on stderr.
+/// Writes a replay to `path` as a page, and reports the file on stderr.
 void write_replay_with_message(const std::string& path, const Replay& replay);
+/// Writes a replay to `path` as an MCAP file, and reports the file on stderr.
 void write_mcap_with_message(const std::string& path, const Replay& replay);
 
-/// Removes the pages of a gallery that earlier calls wrote, lists the other pages, and reports the gallery on stderr.
+/// Finishes a gallery: removes pages of earlier galleries from the folder, writes an index of the new pages, and
+/// reports the gallery on stderr.
 void write_index(FilledFolder* pages);
 
-/// Returns this process's command, quoted for a shell; the program's name has no folder.
+/// Returns this process's command, quoted for a shell. The program's name is without its folder.
 std::string command_line();
 
 }  // namespace pictura

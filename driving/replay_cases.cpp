@@ -13,7 +13,7 @@ namespace {
 
 constexpr const char* kWhyOtherwise = "the policy's numbers differ in their last bits between batch sizes and devices";
 
-// Scene, step and ego of a case, with the ego's speed.
+// Scene, driver, step and ego of a case, with the ego's speed.
 struct CasePlace {
   int32_t scene = 0, driver = 0, step = 0, ego = 0;
   float ego_speed_mps = 0;
@@ -24,7 +24,7 @@ CasePlace place_of(const PedestrianPath& one) { return {one.scene, one.driver, o
 
 CasePlace place_of(const CornerState& one) { return {one.scene, one.driver, one.step, one.ego, one.speed_mps}; }
 
-// Returns the requested case; empty if none was requested.
+// Returns the requested case, or nothing if none was requested.
 std::optional<size_t> asked_case(const CaseReplayOptions& options, size_t count) {
   if (count == 0) fail("--replay: the probe found no case");
   if (!options.number) return std::nullopt;
@@ -69,10 +69,10 @@ std::string about(const CornerState& one, int32_t removed, CornerControl control
                      removed < 0 ? "nobody" : fmt::format("agent {}", removed));
 }
 
-// Returns options of an evaluation that drives a case's scene again, by the scene's driver.
+// Returns options of an evaluation that simulates a case's scene again, with the scene's driver.
 EvaluateOptions driven_by(const ProbeOptions& probe, const CasePlace& place) {
   EvaluateOptions driven = probe.worlds;
-  // A controller's index follows all policies.
+  // place.driver is an index of probe.policies, except if a controller drives.
   if (driven.controller.empty()) driven.checkpoint = probe.policies[place.driver];
   return driven;
 }
@@ -80,7 +80,8 @@ RecordedScenario scenario_of(const ProbeOptions& probe, const ProbeResults& resu
   return {.number = place.scene, .agents_per_world = results.agents_per_world, .world_of = probe.policies[0]};
 }
 
-// Reports if the ego's speed in the replay differs from that in the probe. Speeds in replays are rounded to 1 cm/s.
+// Reports on stderr if the ego's speed in the replay differs from that in the probe. Speeds in replays are rounded to 1
+// cm/s.
 void compare_speed(const std::string& path, const Replay& replay, int frame, int ego, float probed_mps) {
   const double speed_mps = 0.01 * replay.at(Track::speed_mps, frame, ego);
   if (std::abs(speed_mps - double{probed_mps}) < 0.0051) return;
@@ -108,7 +109,7 @@ void write(const CaseReplayOptions& options, const ProbeResults& results, size_t
   compare_speed(options.path, replay, frame, place.ego, place.ego_speed_mps);
 }
 
-// Drives the scene again, and writes its replay.
+// Simulates the case's scene again, and writes the replay.
 void write_scene(const CaseReplayOptions& options, const ProbeOptions& probe, const ProbeResults& results,
                  size_t number, const CasePlace& place, ReplayCase probed) {
   RecordingOptions recording = options.recording;

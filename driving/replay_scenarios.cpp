@@ -39,7 +39,7 @@ class ScenarioRecorder final : public EvaluationObserver {
   std::optional<Recording> recording_;
 };
 
-// Observer that keeps the states of all agents of the only world, and a copy of the world after `step` steps.
+// Observer that records the states of all agents of the only world, and saves a copy of the world after `step` steps.
 class ScenarioKeeper final : public EvaluationObserver {
  public:
   explicit ScenarioKeeper(int step) : step_(step) {}
@@ -73,7 +73,7 @@ EvaluateOptions options_of(const EvaluateOptions& options, const RecordedScenari
   return one;
 }
 
-// Evaluates in the world of another policy, with the observations that the driver reads.
+// Evaluates the driver in the world configuration of another policy, with the observations that the driver reads.
 EvaluateReport evaluate_in_world_of(const std::string& path, PolicySession* driver, const EvaluateOptions& options) {
   const SimulatorConfig its = driver->evaluation_world(options.steps);
   SimulatorConfig world = PolicySession(path, options).evaluation_world(options.steps);
@@ -89,13 +89,13 @@ EvaluateReport evaluate_in_world_of(const std::string& path, PolicySession* driv
   return evaluate(driver, options, &worlds);
 }
 
-// Opens the policy that drives; null for a controller.
+// Returns a session of the policy that drives, or null if a controller drives.
 std::unique_ptr<PolicySession> session_of(const EvaluateOptions& options) {
   if (!options.controller.empty()) return nullptr;
   return std::make_unique<PolicySession>(options.checkpoint, options);
 }
 
-// Drives the scenario, and returns its counts. session: as returned by session_of().
+// Simulates the scenario, and returns its counts. `session` is the result of session_of().
 ScenarioCounts drive(const EvaluateOptions& options, const RecordedScenario& scenario, PolicySession* session) {
   EvaluateOptions one = options;
   if (!session && !scenario.world_of.empty()) one.checkpoint = scenario.world_of;
@@ -106,8 +106,8 @@ ScenarioCounts drive(const EvaluateOptions& options, const RecordedScenario& sce
   return report.results.densities[0].scenarios[0];
 }
 
-// Returns the sort key of a scenario, which is larger for worse scenarios: share of vehicles with at-fault infractions,
-// then share with collisions at fault, then negative distance.
+// Returns a sort key that is larger for worse scenarios: the share of vehicles with infractions at fault, then the
+// share with collisions at fault, then the negative distance driven.
 std::array<double, 3> severity_key(const ScenarioCounts& counts) {
   const auto vehicles = static_cast<double>(std::max<int64_t>(1, counts.vehicles));
   return {static_cast<double>(counts.at_fault_infraction) / vehicles, static_cast<double>(counts.at_fault) / vehicles,
@@ -119,8 +119,8 @@ const ScenarioCounts& counts_of(const EvaluationResults& results, const Scenario
   return density.scenarios[place.scenario - density.first_scenario];
 }
 
-// Returns the recording options with the scenario's worst agent as the followed agent, if no agent was requested and
-// the evaluation contains the worst agent.
+// Returns the recording options. If no followed agent was requested and the evaluation has found the scenario's worst
+// agent, the recording follows that agent.
 RecordingOptions following_worst(RecordingOptions recording, const EvaluationResults& results,
                                  const ScenarioPlace& place) {
   const DensityResult& density = results.densities[place.density];
@@ -166,7 +166,7 @@ Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& s
                        const RecordingOptions& recording, ScenarioCounts* counts_out) {
   EvaluateOptions one = options_of(options, scenario);
   const std::unique_ptr<PolicySession> session = session_of(one);
-  // The policy's responses for the followed agent need a separate renderer that holds the scenario's map.
+  // The policy's responses for the followed agent need a separate renderer that has the scenario's map.
   std::unique_ptr<Renderer> renderer = session ? session->make_renderer() : nullptr;
   ScenarioRecorder recorder({session ? one.checkpoint : one.controller, session.get(), renderer.get()}, recording);
   one.observer = &recorder;

@@ -1,4 +1,4 @@
-// Drives scenarios of an evaluation again and records them.
+// Simulates scenarios of an evaluation again, and records them.
 #pragma once
 
 #include <string>
@@ -9,47 +9,49 @@
 
 namespace pictura {
 
-/// Scenario of an evaluation.
+/// A scenario of an evaluation.
 struct ScenarioPlace {
   size_t density = 0;  // index in the results
   int scenario = 0;    // number of the scenario
 };
 
-/// Returns the `count` worst scenarios, or all if there are fewer, the worst first. A scenario is worse if it has a
-/// larger share of vehicles with an at-fault infraction. Ties are broken by more collisions at fault, then by less
-/// distance driven.
+/// Returns the `count` worst scenarios (or all if there are fewer), the worst first. A scenario is worse if a larger
+/// share of its vehicles has an infraction at fault. Among equal shares, it is worse with a larger share of collisions
+/// at fault, then with less distance driven.
 std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int count);
 
-/// Scenario to drive again.
+/// A scenario to simulate again.
 struct RecordedScenario {
   int number = 0;
   int agents_per_world = 0;
-  std::string world_of;  // policy whose world configuration is used, as in probes; empty: the driver's own
+  // Policy whose world configuration is used, as in probes. If empty, the driver's own configuration is used.
+  std::string world_of;
 };
 
-/// A policy's takeover of `agent` after `step` steps of a scenario, for `steps` steps, while all other agents repeat
-/// their motion. The takeover happens in the world configuration of RecordedScenario::world_of.
+/// A takeover: after `step` steps of a scenario, a policy drives `agent` for `steps` steps, while all other agents
+/// repeat their motion. The steps before the takeover use the world configuration of RecordedScenario::world_of.
 struct RecordedTakeover {
   std::string policy;
-  bool untrained = false;  // has fresh weights
+  bool untrained = false;  // the policy has new random weights
   int step = 0, agent = 0, steps = 0;
 };
 
-/// Drives a scenario again on the host, and records it. `counts_out` receives the scenario's counts. Floating-point
-/// results differ in their last bits between batch sizes and devices, so a policy may drive differently than in its
-/// evaluation.
+/// Simulates a scenario again on the host, and records it. `counts_out` receives the scenario's counts. A policy may
+/// drive differently than in its evaluation, because floating-point results differ in their last bits between batch
+/// sizes and devices.
 Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& scenario,
                        const RecordingOptions& recording, ScenarioCounts* counts_out);
 
-/// Drives a scenario again, on the host, and records it from the takeover on, up to its end or an infraction. Throws
-/// Error if the scenario ends before the takeover.
+/// Simulates a scenario again on the host, and records it from the takeover on. The recording ends with the takeover,
+/// or with an infraction of its agent. Throws Error if the scenario ends before the takeover.
 Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& scenario,
                        const RecordedTakeover& takeover, const RecordingOptions& recording);
 
-/// Write replays by record_scenario(): of the `count` worst scenarios into a folder with a gallery, or of the worst
-/// scenario into one file. Report the files on stderr, and the counts that differ from the evaluation's counts.
+/// Writes replays of the `count` worst scenarios into a folder with a gallery, with record_scenario(). Reports the
+/// files on stderr, and counts that differ from those of the evaluation.
 void write_scenario_replays(const EvaluateOptions& options, const EvaluationResults& results,
                             const RecordingOptions& recording, int count, const std::string& folder);
+/// Writes a replay of the worst scenario into one file, and reports as write_scenario_replays() does.
 void write_scenario_replay(const EvaluateOptions& options, const EvaluationResults& results,
                            const RecordingOptions& recording, const std::string& path);
 

@@ -15,7 +15,7 @@ std::unique_ptr<LiveView> serve(const ServeOptions& options, Simulator& simulato
   auto serving = std::make_unique<LiveView>(simulator, view, origin_of(driver), [&simulator, driver](int agent) {
     return decision_of_agent(simulator, driver, agent);
   });
-  // The address selects the followed agent when the page opens.
+  // The fragment of the URL selects the followed agent when the page opens.
   const std::string opens_with = recording.followed ? fmt::format("#agent={}", *recording.followed) : "";
   print_message("serving {}{} (^C ends it)\n", serving->address(), opens_with);
   return serving;

@@ -44,7 +44,7 @@ void apply_world_options(const WorldOptions& options, SimulatorConfig* config_in
 
 namespace {
 
-/// Selects the tracks that the policy drives, [tracks]: the controlled ones that are present at the start.
+/// Returns which tracks the policy drives, as [tracks]: the controlled tracks that are present at the start.
 std::vector<uint8_t> controlled_tracks(const WorldOptions& options, const CompiledMap& map) {
   try {
     return tracks_of(*map.scenario, options.controlled, map.start_step);

@@ -83,7 +83,7 @@ std::string deflate(std::string_view bytes) {
 }
 
 std::string inflate(std::string_view stream, std::size_t size) {
-  // A zlib stream cannot be shorter than about a thousandth of its content.
+  // A zlib stream has at least about a thousandth of the size of its content.
   PICTURA_CHECK(size / 1040 <= stream.size(), "expected a zlib stream of {} bytes, got {} bytes", size, stream.size());
   std::string bytes(size, '\0');
   uLongf inflated = size;

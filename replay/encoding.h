@@ -1,4 +1,4 @@
-// Encodings of replays: whole numbers as differences of variable length, zlib streams, and base64 for text.
+// Encodings that replay files use: differences of whole numbers with variable length, zlib streams, and base64 text.
 #pragma once
 
 #include <cstdint>
@@ -10,16 +10,17 @@
 
 namespace pictura {
 
-/// Appends a number in groups of 7 bits, lowest group first; small numbers of either sign are short.
+/// Appends a number in groups of 7 bits, the lowest group first. Numbers of small magnitude take few bytes.
 void put_number(int32_t value, std::string* bytes_inout);
 
-/// Reads the numbers written by put_number(). Throws Error if the bytes end, or if put_number() cannot have written
-/// them.
+/// Reads numbers that put_number() wrote. Throws Error if the bytes end within a number, or if put_number() cannot have
+/// written them.
 class NumberReader {
  public:
   explicit NumberReader(std::string_view bytes) : bytes_(bytes) {}
   int32_t next();
-  /// Reads the number of items, each of which takes at least one byte.
+  /// Reads a number of items. Throws Error if it exceeds the remaining bytes, because each item takes at least one
+  /// byte.
   int32_t next_count();
   bool is_at_end() const { return at_ == bytes_.size(); }
 
@@ -28,14 +29,15 @@ class NumberReader {
   std::size_t at_ = 0;
 };
 
-/// Writes and reads numbers as differences of order 0 to 2. The numbers begin at `first`, `stride` apart; the number
-/// before the first counts as 0.
+/// Writes `count` numbers as differences of order 0 to 2. The numbers begin at `first` and are `stride` apart. The
+/// number before the first counts as 0.
 void put_differences(const int32_t* first, std::size_t count, std::size_t stride, int order, std::string* bytes_inout);
+/// Reads the numbers that put_differences() wrote with the same count and order.
 void read_differences(NumberReader* reader, std::size_t count, std::size_t stride, int order, int32_t* first_out);
 
-/// Compresses bytes to a zlib stream, and back to exactly `size` bytes. Throws Error if the stream is damaged or of
-/// another length.
+/// Compresses bytes to a zlib stream.
 std::string deflate(std::string_view bytes);
+/// Decompresses a zlib stream of exactly `size` bytes. Throws Error if the stream is damaged or has another size.
 std::string inflate(std::string_view stream, std::size_t size);
 
 std::string base64(std::string_view bytes);

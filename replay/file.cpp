@@ -22,7 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "pictura replay";
-// Markers for the reader; the page's own script finds its elements by the same names.
+// Markers for the reader. The script of the page finds the elements by the same ids.
 constexpr std::string_view kHeaderBegin = "<script type=\"application/json\" id=\"replay-header\">";
 constexpr std::string_view kDataBegin = "<script type=\"text/plain\" id=\"replay-data\">";
 constexpr std::string_view kImagesBegin = "<script type=\"text/plain\" id=\"replay-images\">";
@@ -243,7 +243,7 @@ void conditioning_from(std::string_view bytes, int32_t num_agents, std::vector<R
   }
 }
 
-// Writes columns of [frames, columns], entity after entity, each through all frames.
+// Writes the columns of [frames, columns] one after the other, each through all frames.
 std::string column_bytes(const int32_t* first, size_t frames, size_t columns, int order) {
   std::string bytes;
   for (size_t column = 0; column < columns; ++column) put_differences(first + column, frames, columns, order, &bytes);
@@ -259,7 +259,7 @@ std::vector<int32_t> columns_from(NumberReader reader, size_t frames, size_t col
 }
 
 constexpr int kLightOrder = 1, kDecisionOrder = 1;
-constexpr int32_t kMaxImage_px = 8192;  // maximum side, as of a rig's cameras
+constexpr int32_t kMaxImage_px = 8192;  // maximum width and height, as for the cameras of a rig
 
 struct Section {
   std::string name;
@@ -284,7 +284,7 @@ std::vector<Section> sections_of(const Replay& replay) {
   return sections;
 }
 
-/// Returns the first groups that fit into a file.
+/// Returns the first groups of images, as many as fit into a file.
 Span<const std::string> written_groups(const ReplayImages& images) {
   size_t count = 0, bytes = 0;
   while (count < images.groups.size() && bytes + images.groups[count].size() <= kMaxWrittenImageBytes) {
@@ -353,7 +353,7 @@ ReplayCase case_from(const Json& json, const Replay& replay) {
   return probed;
 }
 
-// List of the numbers of a camera: X(name).
+// List of the numeric members of a camera, as X(name).
 #define PICTURA_REPLAY_CAMERA(X) \
   X(width_px)                    \
   X(height_px)                   \
@@ -434,7 +434,7 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
           {"policy", origin.policy},
           {"policy_hash", origin.policy_hash},
           {"light_cycles", origin.light_cycles},
-          {"seed", fmt::format("{}", origin.seed)},  // as text, since readers' numbers may be doubles
+          {"seed", fmt::format("{}", origin.seed)},  // as text, because JSON readers may use doubles
           {"global_world", origin.global_world},
           {"dt_s", origin.dt_s},
           {"agents", replay.num_agents},
@@ -455,7 +455,7 @@ Json header_of(const Replay& replay, const std::vector<Section>& sections) {
           {"images", images}};
 }
 
-// Returns the text between an element's begin and its end.
+// Returns the text between the start tag and the end tag of an element.
 std::string_view element(std::string_view page, std::string_view begin, const char* what) {
   const size_t at = page.find(begin);
   PICTURA_CHECK(at != std::string_view::npos, "expected a page of pictura replay, got a file without {}", what);
@@ -578,7 +578,7 @@ Replay replay_from(std::string_view page) {
   return replay;
 }
 
-// Returns the result of `read` on a page, with errors that name the file.
+// Returns the result of `read` for a page. Adds the file's name to errors.
 template <typename Read>
 auto of_page(const std::string& path, Read&& read) {
   const std::string page = read_file(path);

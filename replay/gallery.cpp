@@ -17,7 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kIndex = "index.html";
-constexpr const char* kIndexElement = R"(id="entries">)";  // identifies our index pages
+constexpr const char* kIndexElement = R"(id="entries">)";  // identifies index pages of galleries
 
 int64_t infractions_of(const Json& header) {
   int64_t sum = 0;
@@ -27,7 +27,7 @@ int64_t infractions_of(const Json& header) {
   return sum;
 }
 
-// Returns the index entry of each page in the folder, in the order of their names.
+// Returns the index entries of all pages in the folder, in the order of their names.
 std::vector<Json> entries_of(const std::string& folder) {
   PICTURA_CHECK(std::filesystem::is_directory(folder), "{}: expected a folder of replays", folder);
   std::vector<std::string> names;
@@ -55,7 +55,8 @@ std::vector<Json> entries_of(const std::string& folder) {
   return entries;
 }
 
-// Throws if the folder's index.html is not an index of replays, which must not be overwritten.
+// Throws Error if the folder has an index.html that is not an index of replays, because such a file must not be
+// overwritten.
 void check_index(const std::string& folder) {
   const std::string index = (std::filesystem::path(folder) / kIndex).string();
   if (!std::filesystem::exists(index)) return;

@@ -23,7 +23,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kMaxWriteTime{20};
-// Limits of reading on before closing: a client that is still writing would otherwise lose the answer.
+// Limits for reading the rest of a request before a connection is closed. Without this reading, a client that is still
+// writing would lose the answer.
 constexpr std::chrono::seconds kMaxRestTime{1};
 constexpr size_t kMaxRestBytes = size_t{1} << 20;
 
@@ -44,7 +45,7 @@ const char* reason_of(int status) {
   }
 }
 
-// Waits for events. Returns false when the time is over.
+// Waits for events of the socket. Returns false if none occurs before `end`.
 bool wait_for(int socket, short events, Clock::time_point end) {
   for (;;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now()).count();
@@ -56,7 +57,7 @@ bool wait_for(int socket, short events, Clock::time_point end) {
   }
 }
 
-/// Appends up to `size` received bytes. Returns false at the end of the connection or of the time.
+/// Appends up to `size` received bytes. Returns false if the connection ends or the time `end` is reached.
 bool read_some(int socket, size_t size, Clock::time_point end, std::string* text) {
   std::array<char, 4096> bytes;
   for (;;) {
@@ -85,7 +86,7 @@ std::string_view without_spaces(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
-/// Parses the lines before the body.
+/// Parses the head of a request: all lines before the body.
 HttpRequest parse_head(std::string_view head) {
   const auto next_line = [&head] {
     const size_t end = head.find("\r\n");
@@ -127,7 +128,8 @@ size_t body_bytes(const HttpRequest& request) {
   return *bytes;
 }
 
-/// Reads a request; empty if the connection or the time ends before it is complete. Throws HttpError.
+/// Reads a request. Returns nothing if the connection ends or the time is over before the request is complete. Throws
+/// HttpError for an invalid request.
 std::optional<HttpRequest> read_request(int socket) {
   const Clock::time_point end = Clock::now() + kMaxRequestTime;
   constexpr std::string_view kHeadEnd = "\r\n\r\n";
@@ -147,7 +149,7 @@ std::optional<HttpRequest> read_request(int socket) {
   return request;
 }
 
-// Reads on until the client has closed its side, within limits.
+// Reads until the client has closed its side of the connection, within limits.
 void read_rest(int socket) {
   shutdown(socket, SHUT_WR);
   const Clock::time_point end = Clock::now() + kMaxRestTime;
@@ -206,7 +208,7 @@ HttpServer::HttpServer(bool everywhere, int port, int num_threads, std::string f
   };
   listening_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   check(listening_ >= 0, "socket");
-  const int yes = 1;  // allows a port whose last server has just ended
+  const int yes = 1;  // allows a port that another server used until recently
   setsockopt(listening_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -226,7 +228,7 @@ HttpServer::~HttpServer() {
   {
     const std::lock_guard lock(mutex_);
     is_ending_ = true;
-    // Shutting down makes all waiting calls on these sockets return.
+    // After a shutdown, all calls that wait for these sockets return.
     shutdown(listening_, SHUT_RDWR);
     for (const int socket : sockets_) {
       if (socket >= 0) shutdown(socket, SHUT_RDWR);
@@ -248,7 +250,7 @@ void HttpServer::answer_connections(size_t thread) {
       sockets_[thread] = socket;
     }
     if (socket < 0) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));  // until descriptors are available again
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));  // waits until descriptors are available again
       continue;
     }
     answer_one(socket);

@@ -1,6 +1,6 @@
-// Small HTTP server for pages in this machine's browsers: one request per connection, without ranges, encodings or
-// transfer codings. The cost of a connection is limited before its request is parsed: bytes of the request, time to
-// read it, time to write an answer, and threads.
+// Small HTTP server for pages in browsers, mainly of this machine. Each connection carries one request. Ranges,
+// encodings and transfer codings are not supported. The cost of a connection is limited: the size of the request, the
+// times to read it and to write an answer, and the number of threads.
 #pragma once
 
 #include <chrono>
@@ -16,16 +16,17 @@ namespace pictura {
 
 struct HttpRequest {
   std::string method;
-  std::string path;                                         // without query
-  std::vector<std::pair<std::string, std::string>> fields;  // fields of the header: names in lower case, values
+  std::string path;  // without the query
+  // Fields of the header: name in lower case, and value.
+  std::vector<std::pair<std::string, std::string>> fields;
   std::string body;
 
   int count(std::string_view field) const;
-  /// Returns the value of the first field of this name, or an empty text.
+  /// Returns the value of the first field with this name, or an empty text.
   std::string_view value(std::string_view field) const;
 };
 
-/// Exception for a request that is refused.
+/// Exception with which a handler refuses a request.
 struct HttpError {
   int status;
   std::string why;
@@ -38,7 +39,7 @@ class HttpAnswer {
 
   /// Sends a complete answer.
   void send(int status, std::string_view type, std::string_view content);
-  /// Begins an answer that ends with its connection.
+  /// Begins an answer that ends when the connection ends. Returns whether the connection is still open.
   bool begin_stream(std::string_view type);
   /// Writes bytes. Returns whether the connection is still open.
   bool write(std::string_view bytes);
@@ -49,18 +50,19 @@ class HttpAnswer {
 };
 
 constexpr size_t kMaxRequestHeadBytes = 16384, kMaxRequestBodyBytes = 4096;
-constexpr std::chrono::seconds kMaxRequestTime{5};  // for the whole request to arrive
+constexpr std::chrono::seconds kMaxRequestTime{5};  // maximum time until the whole request has arrived
 
 class HttpServer {
  public:
   using Handler = std::function<void(const HttpRequest&, HttpAnswer&)>;
 
-  /// Listens on the loopback, or on all addresses, at `port` (0: a free one), which it shares with no other server.
-  /// Answers num_threads requests at a time by calls of `handler`, which may throw HttpError; `fields`, header lines,
-  /// are part of every answer. Throws std::system_error if it cannot listen.
+  /// Listens at `port` (0: any free port) on the loopback, or on all addresses if `everywhere`. Up to num_threads
+  /// threads call `handler`, which answers a request and may throw HttpError. Every answer contains `fields`, which are
+  /// header lines. Throws std::system_error if the server cannot listen, for example because another server uses the
+  /// port.
   HttpServer(bool everywhere, int port, int num_threads, std::string fields, Handler handler);
-  /// Closes all connections. Handlers that wait for anything except their connection must be made to return before this
-  /// call.
+  /// Closes all connections. If a handler waits for anything except its connection, the caller must make it return
+  /// before.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;

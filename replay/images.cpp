@@ -13,16 +13,16 @@ namespace pictura {
 
 namespace {
 
-// Coder of LZMA (Pavlov's specification of 2015) with finer probabilities. Carries are held back in a byte and the 0xFF
-// bytes after it.
+// Arithmetic coder of LZMA (Pavlov's specification of 2015) with finer probabilities. The encoder holds back bytes that
+// a carry may still change: one byte, and the 0xFF bytes after it.
 
-/// Probability that a bit is 0, in 1/32768, and the number of bits seen.
+/// Probability that a bit is 0, in units of 1/32768, and the number of bits seen, up to 15.
 struct BitModel {
   uint16_t zero = 16384;
   uint8_t seen = 0;
 
   void learn(int bit) {
-    // Averages the first few bits, then forgets exponentially.
+    // The probability is an average of the first few bits. Later it is an exponential moving average.
     constexpr uint8_t kShift[] = {1, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 5};
     const int shift = kShift[std::min<int>(seen, 15)];
     if (seen < 15) ++seen;
@@ -67,7 +67,8 @@ class Encoder {
 
   uint64_t low_ = 0;
   uint32_t range_ = 0xFFFFFFFFu;
-  // Bytes that a carry may still change: a byte, initially one before all others, and `held_ - 1` bytes 0xFF after it.
+  // Bytes that a carry may still change: `first_`, and `held_ - 1` bytes 0xFF after it. At the start, `first_` is an
+  // additional byte before all others.
   uint8_t first_ = 0;
   size_t held_ = 1;
   std::string bytes_;
@@ -76,7 +77,7 @@ class Encoder {
 class Decoder {
  public:
   explicit Decoder(std::string_view bytes) : bytes_(bytes) {
-    for (int i = 0; i < 5; ++i) code_ = code_ << 8 | next();  // the first byte is 0
+    for (int i = 0; i < 5; ++i) code_ = code_ << 8 | next();  // the first byte is always 0
   }
   int bit(BitModel* chance, int /*value*/) {
     const uint32_t bound = (range_ >> kChanceBits) * chance->zero;
@@ -103,7 +104,7 @@ class Decoder {
   uint32_t code_ = 0, range_ = 0xFFFFFFFFu;
 };
 
-/// Codes a number of `bits` bits, highest bit first, each conditioned on the previous bits.
+/// Codes a number of `bits` bits, the highest bit first. The probability of each bit depends on the previous bits.
 template <typename Coder>
 int code_number(Coder* coder, BitModel* tree, int bits, int value) {
   int node = 1;
@@ -116,18 +117,19 @@ struct Pixel {
   bool operator==(const Pixel&) const = default;
   uint8_t highest() const { return std::max({r, g, b}); }
 };
-/// Pixel that has been coded, with its coding.
+/// A coded pixel and the way in which it was coded.
 struct Coded {
   Pixel pixel;
-  uint8_t how = 0;  // index of the candidate; kNew: none
+  uint8_t how = 0;  // index of the equal candidate, or kNew if none is equal
   uint8_t hue = 0;  // index of the hue; black pixels have none
 };
 
-constexpr int kCandidates = 4, kNew = kCandidates;  // left, above, in the previous frame, above to the right
+// Candidates: the pixels to the left, above, in the previous frame, and above to the right.
+constexpr int kCandidates = 4, kNew = kCandidates;
 constexpr int kHueBits = 5, kNoHue = 30, kFree = 31;
 constexpr int kNumHows = kCandidates + 1, kNumHues = 1 << kHueBits;
 
-/// Returns a hue's pixel of this brightness, the highest channel.
+/// Returns the pixel of a hue with this brightness, which is the value of the highest channel.
 Pixel shade(const ReplayHue& hue, int brightness) {
   const int highest = std::max({hue[0], hue[1], hue[2]});
   const auto channel = [&](int value) {
@@ -136,7 +138,8 @@ Pixel shade(const ReplayHue& hue, int brightness) {
   return {channel(hue[0]), channel(hue[1]), channel(hue[2])};
 }
 
-/// Codes pixel after pixel. With an Encoder it writes the given pixel, with a Decoder it returns the decoded pixel.
+/// Codes pixel after pixel. With an Encoder, code() writes the given pixel. With a Decoder, it returns the decoded
+/// pixel.
 template <typename Coder>
 class PixelCoder {
  public:
@@ -184,7 +187,8 @@ class PixelCoder {
     }
     return best;
   }
-  /// Codes a blend of hues, each channel conditioned on the high bits of the previous channel.
+  /// Codes a pixel without a hue, such as a blend of hues. The probabilities of each channel depend on the high bits of
+  /// the previous channel.
   Pixel code_free(Pixel pixel) {
     const int r = code_number(&coder_, free_[0][0], 8, pixel.r);
     const int g = code_number(&coder_, free_[1][r >> 4], 8, pixel.g);
@@ -201,12 +205,14 @@ class PixelCoder {
   BitModel free_[3][16][256];
 };
 
-/// Codes all frames; next(offset) returns the pixel to write at a byte, put(offset, pixel) receives the coded pixel.
+/// Codes all frames. next(offset) returns the pixel to encode at a byte offset, and put(offset, pixel) receives the
+/// coded pixel.
 template <typename Coder, typename Next, typename Put>
 void code_frames(const std::vector<ReplayCamera>& cameras, size_t num_frames, PixelCoder<Coder>* coder, Next&& next,
                  Put&& put) {
   const Coded black{.pixel = {}, .how = 0, .hue = kNoHue};
-  std::vector<std::vector<Coded>> images;  // previous frame, overwritten pixel by pixel by the current frame
+  // The previous frame, which the current frame overwrites pixel by pixel.
+  std::vector<std::vector<Coded>> images;
   for (const ReplayCamera& camera : cameras) {
     images.emplace_back(static_cast<size_t>(camera.width_px) * static_cast<size_t>(camera.height_px), black);
   }
@@ -232,7 +238,7 @@ void code_frames(const std::vector<ReplayCamera>& cameras, size_t num_frames, Pi
 
 namespace {
 
-// Checksum over all frames of a group, since the coder decodes any bytes.
+// Checksum of all frames of a group. It is needed because the decoder cannot detect damaged bytes.
 constexpr size_t kChecksumBytes = 4;
 uint32_t checksum(std::string_view frames) {
   const uLong begin = adler32(0, nullptr, 0);

@@ -1,6 +1,6 @@
-// Lossless images of a replay. Most pixels equal the pixel to their left, above them, or in the previous image; most
-// others have one of a few hues at some brightness. An adaptive arithmetic coder encodes which case holds, as
-// docs/reference/replay.md defines. Each group of frames is decoded on its own.
+// Lossless compression of a replay's images. Most pixels equal the pixel to their left, above them, or in the previous
+// image. Most other pixels have one of a few hues at some brightness. An adaptive arithmetic coder encodes the case of
+// each pixel; docs/reference/replay.md defines the format. Each group of frames can be decoded separately.
 #pragma once
 
 #include <cstdint>
@@ -14,13 +14,13 @@ namespace pictura {
 
 constexpr int kReplayFramesPerGroup = 25;
 
-/// Colours of primitives before they fade.
+/// Returns the colours of drawn primitives before distance fades them.
 std::vector<ReplayHue> replay_hues();
 
-/// Colour in bytes.
+/// Returns a colour in bytes.
 ReplayHue replay_hue(Rgb color);
 
-/// Bytes of a frame: [height, width, 3] for each camera, one after the other.
+/// Returns the size of a frame in bytes. A frame is [height, width, 3] for each camera, one camera after the other.
 size_t bytes_of_frame(const std::vector<ReplayCamera>& cameras);
 
 /// Compresses one or more complete frames.

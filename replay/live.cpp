@@ -36,7 +36,7 @@ constexpr std::array<std::pair<std::string_view, bool DrivingKeys::*>, 5> kKeys{
 template <typename Number>
 Number number_in(const std::string& name, const LiveJson& value, Number least, Number most) {
   const bool fits = std::is_integral_v<Number> ? value.is_number_integer() : value.is_number();
-  // Compared as doubles, which represent every number in the range.
+  // The comparison uses doubles, which represent every number of the range.
   PICTURA_CHECK(
       fits && value.get<double>() >= static_cast<double>(least) && value.get<double>() <= static_cast<double>(most),
       "{}: expected a number of {} to {}, got {}", name, least, most, value.dump());
@@ -79,7 +79,7 @@ void LiveWorld::after_reset(Span<const uint8_t> world_mask) {
 void LiveWorld::keep_newest(size_t num_episodes) {
   begins_episode_ = recorder_.recorded().episodes.size() > num_episodes;
   recorder_.discard_history();
-  ++step_;  // frame number in the count of pages
+  ++step_;  // number of the frame, as pages count
 }
 
 LiveJson LiveWorld::begin() const {
@@ -124,7 +124,7 @@ LiveRequest parse_live_request(std::string_view text, int num_agents) {
   LiveJson asked;
   try {
     asked = parse_json(text);
-  } catch (const LiveJson::exception&) {  // also for a number beyond the range of doubles
+  } catch (const LiveJson::exception&) {  // thrown also for a number beyond the range of doubles
     fail("expected JSON");
   }
   PICTURA_CHECK(asked.is_object(), "expected an object of JSON, got {}", asked.type_name());

@@ -12,8 +12,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kMaxBehind{500};              // steps delayed by more are not caught up
-constexpr std::chrono::seconds kKeysHold{1}, kDrivingTimeout{5};  // without messages from the driving page
+constexpr std::chrono::milliseconds kMaxBehind{500};              // maximum delay of steps that is caught up
+constexpr std::chrono::seconds kKeysHold{1}, kDrivingTimeout{5};  // if the driving page sends no message
 constexpr std::chrono::milliseconds kCloseTimeout{1000};
 constexpr std::chrono::milliseconds kPollInterval{50};  // maximum wait of one is_due()
 
@@ -59,7 +59,7 @@ struct LiveView::Parts {
     }
   }
 
-  // Handles pages' requests since the last call, and sends them pending messages.
+  // Handles the requests of pages since the last call, and sends pending messages to the pages.
   void process_requests() {
     const std::vector<LiveRequest> requests = server.take_requests();
     for (const LiveRequest& asked : requests) apply(asked);

@@ -1,5 +1,5 @@
-// Live view of a running world, in which pages in a browser watch, pause, step and drive. It executes their requests
-// and paces the steps.
+// Live view of a running world. Pages in a browser watch the world, pause it, step it, and drive an agent. The view
+// executes their requests, and paces the steps.
 #pragma once
 
 #include <chrono>
@@ -17,36 +17,38 @@
 namespace pictura {
 
 struct LiveViewOptions {
-  int port = 0;                // 0: a free one
-  std::string host_name;       // if set: listens on all addresses, for pages that address this machine by this name
-  int watched = 0;             // initial agent whose decisions and images pages get
+  int port = 0;  // 0: any free port
+  // If set, the view listens on all addresses, for pages that use this name of the machine.
+  std::string host_name;
+  int watched = 0;             // agent whose decisions and images pages receive at first
   RendererConfig cameras;      // cameras of every agent
-  bool sends_images = false;   // images of the watched agent, drawn here; else pages draw them
-  bool waits_for_page = true;  // waits for the first page before the first step
+  bool sends_images = false;   // sends images of the watched agent; else pages draw them
+  bool waits_for_page = true;  // the first step waits for the first page
 };
 
 class LiveView final : public StepObserver {
  public:
-  /// Returns the present response of the agent's policy; empty for other controllers.
+  /// Function that returns the policy's response to the agent's current state, or nothing if no policy drives the
+  /// agent.
   using Decide = std::function<std::optional<ReplayDecision>(int agent)>;
 
-  /// Serves the only world of a simulator in host memory, which must outlive the view. Throws UsageError if this build
-  /// lacks the server or the agent does not exist, Error if the port is in use.
+  /// Serves the only world of a simulator in host memory. The simulator must outlive the view. Throws UsageError if
+  /// this build lacks the server or the watched agent does not exist, and Error if the port is in use.
   LiveView(Simulator& simulator, const LiveViewOptions& options, const ReplayOrigin& origin, Decide decide);
   ~LiveView() override;
 
-  /// Address of the page, including its secret.
+  /// Returns the URL of the page, which contains a secret.
   const std::string& address() const;
   int num_pages() const;
 
-  /// Executes the pages' requests and waits, for at most 50 ms, until the next step is due.
+  /// Executes the pages' requests, then waits for at most 50 ms until the next step is due. Returns whether it is due.
   bool is_due() override;
-  /// Replaces the command of the agent that a viewer drives by keys, in commands [slots].
+  /// Replaces the command of the agent that a viewer drives by keys. The commands are [slots].
   void override_commands(Span<Command> commands_inout) override;
   void before_step(Span<const Command> commands) override;
   void after_step(const StepResult& result) override;
   void after_reset(Span<const uint8_t> world_mask) override;
-  /// Tells pages that the simulation has ended; they keep what they have received.
+  /// Notifies pages that the simulation has ended. The pages keep the frames that they have received.
   void finish();
 
  private:

@@ -27,7 +27,7 @@ ReplayShape rectangle(const ParkingSpace& space) {
   return shape;
 }
 
-/// Appends pieces as lines; a piece that continues the previous piece extends its line.
+/// Appends pieces as lines. A piece that continues the previous piece extends the previous piece's line.
 template <typename Pieces>
 void append_lines(ShapeKind kind, const Pieces& pieces, std::vector<ReplayShape>* shapes_out) {
   const size_t first = shapes_out->size();

@@ -1,4 +1,4 @@
-// Map in the form of replays: its shapes from above, and the geometry that cameras see.
+// Converts a map to the form of replays: its shapes from above, and the geometry that cameras see.
 #pragma once
 
 #include <vector>
@@ -8,10 +8,11 @@
 
 namespace pictura {
 
-/// Returns the shapes in drawing order; lights come last, in the order of the map.
+/// Returns the shapes in drawing order. Traffic lights come last, in the order of the map.
 std::vector<ReplayShape> map_shapes(const CompiledMap& map);
 
-/// Returns the geometry that renderers draw. A strip that continues the previous strip extends its line.
+/// Returns the geometry that renderers draw. If a strip continues the previous strip, it extends the previous strip's
+/// line.
 ReplayScenery map_scenery(const StaticGeometry& geometry);
 
 }  // namespace pictura

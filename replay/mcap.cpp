@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFrame = "map";  // frame of coordinates: metres, x east, y north, z up
+constexpr const char* kFrame = "map";  // coordinate frame in metres: x east, y north, z up
 constexpr double kRadPerDdeg = 3.14159265358979323846 / 1800;
 
 Json time_json(uint64_t ns) { return {{"sec", ns / 1000000000}, {"nsec", ns % 1000000000}}; }
@@ -28,7 +28,7 @@ Json pose_json(double x, double y, double z, double heading_rad) {
           {"orientation", {{"x", 0}, {"y", 0}, {"z", std::sin(heading_rad / 2)}, {"w", std::cos(heading_rad / 2)}}}};
 }
 
-// Schemas with the written members of Foxglove's schemas of the same names.
+// Schemas with the names of Foxglove's schemas, and with those of their members that are written.
 Json object_schema(Json properties) { return {{"type", "object"}, {"properties", std::move(properties)}}; }
 Json numbers_schema(std::initializer_list<const char*> names) {
   Json properties;
@@ -101,12 +101,12 @@ Json shape_color(const ReplayShape& shape) {
 Json map_json(const Replay& replay) {
   Json lines = Json::array();
   for (const ReplayShape& shape : replay.map) {
-    // Lanes share their edges with shapes that are drawn.
+    // Lanes are not drawn, because other drawn shapes show their edges.
     if (shape.kind == ShapeKind::light || shape.kind == ShapeKind::lane) continue;
     const bool is_ring = shape.kind == ShapeKind::crosswalk || shape.kind == ShapeKind::parking_space;
     Json points = Json::array();
     for (const auto& [x_cm, y_cm] : shape.points_cm) points.push_back(vector_json(x_cm / 100.0, y_cm / 100.0, 0));
-    lines.push_back({{"type", is_ring ? 1 : 0},  // loop or strip
+    lines.push_back({{"type", is_ring ? 1 : 0},  // 1: closed loop, 0: open line
                      {"pose", pose_json(0, 0, 0, 0)},
                      {"thickness", std::max(0.1, shape.width_cm / 100.0)},
                      {"scale_invariant", false},
@@ -181,7 +181,7 @@ Json lights_json(const Replay& replay, int frame, uint64_t ns) {
   return scene_json(std::move(entity));
 }
 
-// Numbers of one agent, for plots.
+// Returns the numbers of one agent, for plots.
 Json agent_json(const Replay& replay, int frame, int agent) {
   Json numbers{{"agent", agent}};
   for (size_t track = 0; track < kNumTracks; ++track) {
@@ -210,7 +210,7 @@ constexpr std::array<std::pair<int32_t, const char*>, 6> kEventNames{{{kEventCol
                                                                       {kEventRedLight, "red light"},
                                                                       {kEventWall, "wall"},
                                                                       {kEventMetricGoal, "goal"}}};
-constexpr int kInfo = 2, kWarning = 3;  // levels of foxglove.Log
+constexpr int kInfo = 2, kWarning = 3;  // log levels of foxglove.Log
 
 std::string png_of(const ReplayCamera& camera, const char* rgb) {
   png_image image{};
@@ -226,7 +226,7 @@ std::string png_of(const ReplayCamera& camera, const char* rgb) {
   return png;
 }
 
-/// Position of an agent, in the coordinates of the map's file.
+/// Returns the position of an agent as text, in the coordinates of the map's file.
 std::string place_text(const Replay& replay, int frame, int agent) {
   const auto coordinate = [&](Track track, size_t axis) {
     return 0.01 * replay.at(track, frame, agent) + replay.origin.map_origin_m[axis];
@@ -254,9 +254,10 @@ void write_mcap(const std::string& path, const Replay& replay) {
   }
   writer.add_message(map, 0, json_text(map_json(replay)));
 
-  // Rounded, since a float of 0.1 s is not 0.1 s to the nanosecond.
+  // The duration is rounded to microseconds, because the float nearest to 0.1 s differs from 0.1 s by more than a
+  // nanosecond.
   const auto step_ns = static_cast<uint64_t>(std::llround(static_cast<double>(origin.dt_s) * 1e6)) * 1000;
-  std::string frames;  // frames of a group of images
+  std::string frames;  // decompressed frames of the current group of images
   size_t episode = 0;
   for (int frame = 0; frame < replay.num_frames; ++frame) {
     const uint64_t ns = static_cast<uint64_t>(frame) * step_ns;

@@ -1,4 +1,5 @@
-// Replays as MCAP files of JSON messages by Foxglove's schemas, for Foxglove and other readers of that format.
+// Writes replays as MCAP files, for Foxglove and other readers of that format. Messages are JSON with Foxglove's
+// schemas.
 #pragma once
 
 #include <string>
@@ -8,8 +9,8 @@
 
 namespace pictura {
 
-/// Writes the file, completely or not at all; docs/reference/replay.md lists its topics. Time begins at 0. Throws Error
-/// naming the path.
+/// Writes the file, completely or not at all. docs/reference/replay.md lists its topics. Times begin at 0. Throws
+/// Error, which names the path, if the file cannot be written.
 void write_mcap(const std::string& path, const Replay& replay);
 
 }  // namespace pictura

@@ -49,7 +49,7 @@ uint32_t crc_of(std::string_view bytes, uint32_t before = 0) {
   return static_cast<uint32_t>(crc32_z(before, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }
 
-/// Encodes a map from channels to numbers: the size in bytes, then the entries.
+/// Encodes a map from channels to numbers: its size in bytes, then its entries.
 std::string channel_map(const std::map<uint16_t, uint64_t>& values) {
   std::string entries, bytes;
   for (const auto& [channel, value] : values) {
@@ -197,7 +197,7 @@ void McapWriter::finish() {
   // The checksum covers the summary and the footer's first fields.
   content.clear();
   put_fixed(summary_begin, &content);
-  put_fixed(uint64_t{0}, &content);  // no offsets within the summary
+  put_fixed(uint64_t{0}, &content);  // the summary has no offset section
   std::string begin_of_footer(1, static_cast<char>(Op::footer));
   put_fixed(static_cast<uint64_t>(content.size() + sizeof(uint32_t)), &begin_of_footer);
   put_fixed(crc_of(begin_of_footer + content, crc_of(summary)), &content);

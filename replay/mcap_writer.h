@@ -1,5 +1,5 @@
-// Container of an MCAP file (https://mcap.dev/spec): schemas, channels, messages in uncompressed chunks, and the
-// indexes with which readers seek.
+// Writer of MCAP files (https://mcap.dev/spec): schemas, channels, messages in uncompressed chunks, and the indexes
+// that readers use to seek.
 #pragma once
 
 #include <cstdint>
@@ -15,12 +15,12 @@ namespace pictura {
 
 class McapWriter {
  public:
-  /// Opens the file. Throws Error naming the path, as all functions that write do.
+  /// Opens the file. All functions that write throw Error, which names the path, if writing fails.
   McapWriter(const std::string& path, std::string_view library);
 
-  /// Adds a topic of JSON messages with a schema in JSON Schema. Returns its channel.
+  /// Adds a topic of JSON messages, with a schema in JSON Schema. Returns the topic's channel.
   uint16_t add_channel(std::string_view topic, std::string_view schema_name, std::string_view schema);
-  /// Adds names and texts that describe the whole file.
+  /// Adds entries (names and texts) that describe the whole file.
   void add_metadata(std::string_view name, const std::vector<std::pair<std::string, std::string>>& entries);
   void add_message(uint16_t channel, uint64_t time_ns, std::string_view json);
   /// Writes the remaining records, and renames the file to `path`.
@@ -41,7 +41,8 @@ class McapWriter {
   uint16_t num_channels_ = 0;
   std::string chunk_;
   uint64_t first_ns_ = 0, last_ns_ = 0;
-  std::map<uint16_t, std::vector<std::pair<uint64_t, uint64_t>>> entries_;  // times and offsets of the chunk's messages
+  // Times and offsets of the chunk's messages, by channel.
+  std::map<uint16_t, std::vector<std::pair<uint64_t, uint64_t>>> entries_;
   std::map<uint16_t, uint64_t> counts_;
   std::vector<ChunkIndex> chunks_;
   uint64_t num_messages_ = 0, num_metadata_ = 0, begin_ns_ = 0, end_ns_ = 0;

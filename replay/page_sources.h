@@ -1,4 +1,4 @@
-// Texts of replay/page/, embedded by the build (cmake/EmbedTexts.cmake).
+// Page templates of replay/page/, which the build embeds (cmake/EmbedTexts.cmake).
 #pragma once
 
 #include <string_view>

@@ -18,7 +18,7 @@ namespace {
 
 constexpr int32_t kTurn_ddeg = 3600;
 
-/// Returns the same heading, at most half a turn from the previous heading.
+/// Adds whole turns to a heading, so that it differs from the previous heading by at most half a turn.
 int32_t near_heading(int32_t heading_ddeg, int32_t before_ddeg) {
   const int32_t apart = heading_ddeg - before_ddeg;
   const auto turns = static_cast<int32_t>(std::lround(static_cast<double>(apart) / kTurn_ddeg));
@@ -30,7 +30,7 @@ ReplayBody body_of(const AgentBox& box) {
   return {box.agent_class, centimetres(box.length_m), centimetres(box.width_m), centimetres(box.height_m)};
 }
 
-/// Life that began in the middle of an episode.
+/// A life (the time from an agent's entry to its exit) that began in the middle of an episode.
 struct LaterLife {
   size_t episode = 0;  // index among the replay's episodes
   int32_t frame = 0, agent = 0;
@@ -38,7 +38,8 @@ struct LaterLife {
   std::vector<float> conditioning;
 };
 
-/// Turns every later life into a separate agent, after the existing agents. Lives are in the order of their frames.
+/// Turns each later life into a separate agent. The new agents follow the existing agents. `lives` are in the order of
+/// their frames.
 void split_lives(const std::vector<LaterLife>& lives, Replay* replay_inout) {
   if (lives.empty()) return;
   Replay& replay = *replay_inout;
@@ -49,7 +50,7 @@ void split_lives(const std::vector<LaterLife>& lives, Replay* replay_inout) {
   const int32_t num_agents = *std::max_element(next.begin(), next.end());
   check_replay_room(num_agents, int64_t{replay.num_frames});
 
-  // Agent of each frame and slot.
+  // Index of the agent at each frame and slot.
   std::vector<int32_t> agent_of(static_cast<size_t>(replay.num_frames) * static_cast<size_t>(num_slots));
   const auto at = [num_slots](int32_t frame, int32_t slot) {
     return static_cast<size_t>(frame) * static_cast<size_t>(num_slots) + static_cast<size_t>(slot);
@@ -123,8 +124,8 @@ std::vector<ReplayCamera> replay_cameras(const Rig& rig) {
 }
 
 AgentCameras::AgentCameras(Simulator& simulator, RendererConfig config) : simulator_(simulator) {
-  config.device = {};   // the CPU oracle draws on the host
-  config.samples = {};  // with exact coverage
+  config.device = {};   // the CPU renderer draws on the host
+  config.samples = {};  // default samples: exact coverage
   renderer_ = make_renderer("cpu", config);
   upload_maps(simulator, renderer_.get());
   images_ = std::make_unique<HostImages>(renderer_->config().rig, 1);
@@ -164,7 +165,7 @@ struct Recorder::Parts {
     replay.images.frames_per_group = kReplayFramesPerGroup;
   }
 
-  // Updates the seed of the world's random numbers, which resets change.
+  // Updates the seed of the world's random numbers, because resets change the seed.
   void take_seed() { replay.origin.seed = simulator.arrays().seed[world]; }
   size_t slot(int32_t agent) const { return static_cast<size_t>(first_slot + agent); }
   std::vector<int32_t>& track(Track which) { return replay.tracks[static_cast<size_t>(which)]; }
@@ -202,7 +203,7 @@ struct Recorder::Parts {
                            {conditioning, conditioning + kNumConditioning}});
   }
 
-  // Adds zeros for the step before the next frame, since no step led to it.
+  // Adds zeros for the step before the next frame, because no step led to that frame.
   void add_no_step() {
     const auto count = static_cast<size_t>(replay.num_agents);
     const auto add_zeros = [count](std::vector<int32_t>& values) { values.insert(values.end(), count, 0); };
@@ -279,7 +280,7 @@ struct Recorder::Parts {
     decision.reset();
   }
 
-  /// Adds action and reward of every agent in the step that led to the next frame.
+  /// Adds the action and the reward of every agent for the step that led to the next frame.
   void add_step(const StepResult& result) {
     const AgentStateView state = simulator.state();
     for (int32_t agent = 0; agent < replay.num_agents; ++agent) {
@@ -404,7 +405,7 @@ void Recorder::discard_history() {
   ReplayEpisode& episode = replay.episodes.back();
   episode.first_frame = 0;
   episode.num_frames = 1;
-  // Current chain of each agent.
+  // Keeps the current chain of each agent.
   std::vector<const ReplayChain*> last(static_cast<size_t>(replay.num_agents), nullptr);
   for (const ReplayChain& chain : episode.chains) last[chain.agent] = &chain;
   std::vector<ReplayChain> kept;

@@ -16,20 +16,20 @@ namespace pictura {
 
 struct RecorderOptions {
   int world = 0;
-  int followed = -1;          // agent of the world whose decisions and images are recorded, or -1
+  int followed = -1;          // agent whose decisions and images are recorded, or -1
   RendererConfig cameras;     // cameras of every agent, for viewers of the replay
-  bool keeps_images = false;  // images of the followed agent, drawn by the CPU renderer
+  bool keeps_images = false;  // records images of the followed agent, drawn by the CPU renderer
 };
 
 /// Draws one agent's images with the CPU renderer.
 class AgentCameras {
  public:
-  /// Creates a renderer for the configuration of a policy, whose device and samples are ignored. The simulator must
-  /// outlive it.
+  /// Creates a renderer with this configuration, except its device and samples. The simulator must outlive this object.
   AgentCameras(Simulator& simulator, RendererConfig config);
   ~AgentCameras();
 
-  /// Draws a slot's present view: [height, width, 3] for each camera, one after the other.
+  /// Draws the current view of a slot's agent. Returns [height, width, 3] bytes for each camera, one camera after the
+  /// other.
   std::string draw(int slot);
 
  private:
@@ -52,14 +52,15 @@ ReplayDecision decision_of(Span<const float> logits, float value);
 /// Returns a box in a replay's units.
 ReplayBox replay_box(const AgentBox& box);
 
-/// Throws Error if a replay of this number of agents and steps would hold too many numbers: an early check for the
-/// error of Recorder::after_step().
+/// Throws Error if a replay of this number of agents and steps would exceed the limit kMaxReplayNumbers. This is an
+/// early check for the error that Recorder::after_step() throws.
 void check_replay_room(int num_agents, int64_t num_steps);
 
-/// Recorder of one world. Throws UsageError if the simulator does not use host memory, or lacks the world or agent.
+/// Recorder of one world. The constructor throws UsageError if the simulator does not use host memory, or if the world
+/// or the followed agent does not exist.
 class Recorder final : public StepObserver {
  public:
-  /// Starts recording; the simulator's present state is the first frame. The simulator must outlive the recorder.
+  /// Starts recording. The simulator's current state is the first frame. The simulator must outlive the recorder.
   Recorder(Simulator& simulator, const RecorderOptions& options);
   ~Recorder() override;
 
@@ -71,12 +72,14 @@ class Recorder final : public StepObserver {
   /// Begins an episode if this recorder's world is in the mask.
   void after_reset(Span<const uint8_t> world_mask = {}) override;
 
-  /// Recording so far, without images that are not yet compressed; its last frame is the simulator's state.
+  /// Returns the recording so far, without images that are not yet compressed. The last frame is the simulator's
+  /// current state.
   const Replay& recorded() const;
-  /// Sets the origin, with the simulator's entries (map, seed, world, pace) filled in.
+  /// Sets the origin of the replay. Overwrites the entries that the simulator determines: map, seed, world, step
+  /// duration and light cycles.
   void set_origin(ReplayOrigin origin);
-  /// Discards all frames but the last, which becomes the first of a replay; metrics continue. Not with a followed
-  /// agent.
+  /// Discards all frames except the last, which becomes the first frame of the recording. Metrics continue. Throws
+  /// Error if the recorder follows an agent.
   void discard_history();
 
   /// Returns the complete replay, with this origin. The recorder cannot be used afterwards.

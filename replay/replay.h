@@ -1,5 +1,6 @@
-// Replay of one world over many steps, in whole units (1 cm, 0.1 degree), so that it is written and read without loss.
-// A frame is a state; a step leads from each frame to the next. docs/reference/replay.md describes the file.
+// Replay of one world over many steps. Values are whole numbers of units (such as 1 cm or 0.1 degree), so that files
+// store them without loss. A frame is a state, and a step leads from each frame to the next. docs/reference/replay.md
+// describes the file.
 #pragma once
 
 #include <array>
@@ -17,15 +18,15 @@
 
 namespace pictura {
 
-/// Maximum number of values in all tracks of a replay: 120 agents for 24,000 steps, in 256 MB.
+/// Maximum number of values in all tracks of a replay: for example, 120 agents for 24,000 steps, which take 256 MB.
 constexpr int64_t kMaxReplayNumbers = int64_t{1} << 26;
 
-/// Version of the format; readers accept no other version.
+/// Version of the file format. Readers accept no other version.
 constexpr int kReplayVersion = 2;
 
-// List of quantities of every agent at every frame: X(name, unit, order), a whole number of units, stored as
-// differences of this order between frames. Values of a step belong to the frame after the step, and are 0 at the first
-// frame of an episode.
+// List of the tracks, which are quantities of every agent at every frame: X(name, unit, order). A track stores whole
+// numbers of its unit, as differences of its order between frames. Values of a step belong to the frame after the step.
+// They are 0 at the first frame of an episode.
 #define PICTURA_REPLAY_STATE_TRACKS(X) \
   X(x_m, 0.01, 2)                      \
   X(y_m, 0.01, 2)                      \
@@ -39,8 +40,8 @@ constexpr int kReplayVersion = 2;
   X(events, 1, 0)                      \
   X(action, 1, 0)
 
-/// Tracks: centre of the box, heading without jumps by a turn, AgentStatus, Event bits, and 1 + action, or 0 if an
-/// agent chose no action itself.
+/// Tracks. Positions are of the box's centre. Headings do not jump by a turn. `status` is an AgentStatus, and `events`
+/// are Event bits. `action` is 1 + action, or 0 if the agent did not choose an action itself.
 enum class Track : int32_t {
 #define X(name, unit, order) name,
   PICTURA_REPLAY_STATE_TRACKS(X)
@@ -52,7 +53,7 @@ enum class Track : int32_t {
 };
 constexpr size_t kNumTracks = static_cast<size_t>(Track::count);
 
-/// Unit of rewards. The smallest term of a step is the time penalty, 2.5e-6.
+/// Unit of rewards. It is small, because the smallest term of a step, the time penalty, is 2.5e-6.
 constexpr double kRewardUnit = 1e-7;
 
 struct TrackInfo {
@@ -75,14 +76,14 @@ struct ReplayBody {
   bool operator==(const ReplayBody&) const = default;
 };
 
-/// Stationary road user: a parked car, for the whole episode, or a road user that a probe inserts.
+/// Stationary road user: a parked car, or a road user that a probe inserts.
 struct ReplayBox {
   ReplayBody body;
   int32_t x_cm = 0, y_cm = 0, z_cm = 0, heading_ddeg = 0;  // heading in tenths of a degree
   bool operator==(const ReplayBox&) const = default;
 };
 
-/// Goal chain of an agent from this frame on.
+/// Goal chain (waypoints) of an agent from frame `frame` on.
 struct ReplayChain {
   int32_t frame = 0, agent = 0;
   std::array<int32_t, kNumWaypoints> x_cm{}, y_cm{}, z_cm{};
@@ -95,19 +96,20 @@ struct ReplayEpisode {
   std::vector<ReplayBody> agents;   // [agents]
   std::vector<float> conditioning;  // [agents, kNumConditioning]
   std::vector<ReplayBox> parked;
-  std::vector<ReplayChain> chains;  // by frame
+  std::vector<ReplayChain> chains;  // in the order of frames
   bool operator==(const ReplayEpisode&) const = default;
 };
 
 enum class ShapeKind : uint8_t {
-  lane,           // ring; detail: LaneType
+  lane,           // ring; ReplayShape::detail is a LaneType
   crosswalk,      // ring
   parking_space,  // ring
-  marking,        // line; detail: MarkColor
+  marking,        // line; ReplayShape::detail is a MarkColor
   stop_line,      // line
   road_edge,      // line
   wall,           // line
-  light,          // the stop line's ends, its head, and a point one metre before the head; in the order of the map
+  // Points: both ends of the stop line, the head, and a point one metre in front of the head. In the order of the map.
+  light,
 };
 constexpr int kNumShapeKinds = 8;
 
@@ -119,12 +121,12 @@ struct ReplayShape {
   bool operator==(const ReplayShape&) const = default;
 };
 
-/// Colour before it fades, [red, green, blue].
+/// Colour before distance fades it: [red, green, blue].
 using ReplayHue = std::array<uint8_t, 3>;
 using ReplayPoint = std::array<int32_t, 3>;  // x, y, z in cm
 
-/// Geometry of the map that cameras see, see docs/explanation/image.md. Lines are painted on the road from point to
-/// point, as append_strips() converts them to strips, in the order of the map's strips.
+/// A painted line of the map, for drawing images (docs/explanation/image.md). append_strips() converts its points to
+/// strips. Lines are in the order of the map's strips.
 struct ReplayLine {
   StripKind kind = StripKind::lane_mark;
   ReplayHue color{};
@@ -151,12 +153,12 @@ struct ReplayScenery {
   bool operator==(const ReplayScenery&) const = default;
 };
 
-/// Response of the followed agent's policy to a frame, in units of kDecisionUnit: the probability of each action, and
-/// the value. All 0 if the policy was not evaluated.
+/// Number of values of a decision: the response of the followed agent's policy to a frame. They are the probability of
+/// each action, then the value, in units of kDecisionUnit. All are 0 if the policy was not evaluated.
 constexpr size_t kDecisionValues = kNumActions + 1;
 constexpr double kDecisionUnit = 1e-4;
 
-/// Camera on a body, with the members of Camera.
+/// Camera on an agent's body, with the members of Camera.
 struct ReplayCamera {
   std::string name;
   int32_t width_px = 0, height_px = 0;
@@ -165,27 +167,29 @@ struct ReplayCamera {
   bool operator==(const ReplayCamera&) const = default;
 };
 
-/// Images of the followed agent in the first frames, compressed in complete groups of frames.
+/// Compressed images of the followed agent, from the first frame on. Each group contains frames_per_group frames,
+/// except the last group, which may contain fewer.
 struct ReplayImages {
   int32_t frames_per_group = 0;
   std::vector<std::string> groups;  // see images.h
   bool operator==(const ReplayImages&) const = default;
 };
 
-/// Origin of a replay, for people and galleries.
+/// Origin of a replay. Pages and galleries show it.
 struct ReplayOrigin {
   std::string command, commit, version;
   std::string map, map_hash;
-  std::array<double, 3> map_origin_m{};  // file coordinates of the map's (0, 0, 0); zero in files of earlier versions
+  // File coordinates of the map's (0, 0, 0); zero in replay files of earlier versions.
+  std::array<double, 3> map_origin_m{};
   std::string policy, policy_hash;
-  std::string light_cycles;  // text of light_cycles_text(); empty in files of versions without it
+  std::string light_cycles;  // from light_cycles_text(); empty in files of earlier versions
   uint64_t seed = 0;
   uint32_t global_world = 0;
   float dt_s = 0.1f;
   bool operator==(const ReplayOrigin&) const = default;
 };
 
-/// Metrics over the whole recording. Event counts are in agent-steps.
+/// Metrics of the whole recording. Events are counted in agent-steps: one for each agent and step with the event.
 struct ReplayMetrics {
   int64_t spawned = 0, agent_steps = 0;
   int64_t collisions = 0, at_fault_collisions = 0, off_road = 0, red_light = 0, wall_contacts = 0;
@@ -193,7 +197,7 @@ struct ReplayMetrics {
   double km_driven = 0, reward = 0;
   bool operator==(const ReplayMetrics&) const = default;
 };
-// List of the metrics: X(name).
+// List of the metrics, as X(name).
 #define PICTURA_REPLAY_METRICS(X) \
   X(spawned)                      \
   X(agent_steps)                  \
@@ -207,18 +211,18 @@ struct ReplayMetrics {
   X(km_driven)                    \
   X(reward)
 
-/// Response of a policy to a state with a road user, and to the same state without it: values and braking
-/// probabilities.
+/// Response of a policy (value and probability of braking) to a state with a certain road user, and to the same state
+/// without this road user.
 struct ReplayResponse {
   std::string policy;
   double value = 0, value_without = 0, brake = 0, brake_without = 0;
   bool operator==(const ReplayResponse&) const = default;
 };
 
-/// Case of a probe at a frame of this replay: one road user that is removed from the frame, or inserted into it, as one
-/// agent observes it.
+/// Case of a probe, which tests an agent's response to one road user. The road user is removed from a frame of this
+/// replay, or inserted into it. `ego` is the responding agent.
 struct ReplayCase {
-  std::string what;  // a sentence for people
+  std::string what;  // a sentence that describes the case
   int32_t frame = 0, ego = 0;
   int32_t removed = -1;                         // agent, or -1
   std::optional<ReplayBox> inserted;            // road user inserted into the frame of the case
@@ -227,7 +231,7 @@ struct ReplayCase {
   bool operator==(const ReplayCase&) const = default;
 };
 
-/// Moment that galleries show first; frame -1: none.
+/// Moment that galleries show first. Frame -1 means none.
 struct ReplayMoment {
   int32_t frame = -1, agent = 0;
   bool operator==(const ReplayMoment&) const = default;
@@ -243,19 +247,19 @@ struct Replay {
   std::vector<ReplayShape> map;
   ReplayScenery scenery;
   std::vector<ReplayCamera> cameras;  // cameras of every agent
-  float line_floor_px = 0;            // line floor of their images
+  float line_floor_px = 0;            // line floor (minimum line width) of the images
   std::vector<ReplayEpisode> episodes;
   std::array<std::vector<int32_t>, kNumTracks> tracks;  // [frames, agents]
   std::vector<uint8_t> lights;                          // [frames, lights] LightState
   std::vector<int32_t> decisions;                       // [frames, kDecisionValues], or empty
-  ReplayImages images;                                  // without groups if there are none
+  ReplayImages images;                                  // has no groups if there are no images
   bool operator==(const Replay&) const = default;
 
   int32_t at(Track track, int frame, int agent) const {
     return tracks[static_cast<size_t>(track)]
                  [static_cast<size_t>(frame) * static_cast<size_t>(num_agents) + static_cast<size_t>(agent)];
   }
-  /// Number of frames, from the first on, with images of the followed agent.
+  /// Returns the number of frames, from the first on, that have images of the followed agent.
   int num_pictured_frames() const {
     const auto kept = static_cast<int64_t>(images.groups.size()) * images.frames_per_group;
     return static_cast<int>(kept < num_frames ? kept : num_frames);

@@ -23,7 +23,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kTokenBytes = 16;
-constexpr int kThreads = kMaxLivePages + 8;  // for listening pages, and for all other requests
+constexpr int kThreads = kMaxLivePages + 8;  // one for each listening page, and 8 for other requests
 constexpr const char* kHeaderFields =
     "Cache-Control: no-store\r\n"
     "Content-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src "
@@ -31,7 +31,7 @@ constexpr const char* kHeaderFields =
     "Cross-Origin-Resource-Policy: same-origin\r\n"
     "Referrer-Policy: no-referrer\r\n"
     "X-Content-Type-Options: nosniff\r\n";
-constexpr std::chrono::seconds kHeartbeat{10};  // reveals to the server that a page has gone
+constexpr std::chrono::seconds kHeartbeat{10};  // writing it reveals that a page has gone
 
 std::string random_token() {
   std::array<unsigned char, kTokenBytes> bytes{};
@@ -43,7 +43,8 @@ std::string random_token() {
   return token;
 }
 
-// Compares in a time that does not depend on the number of equal characters.
+// Compares texts of equal length in a time that does not depend on their contents, so that timing does not reveal a
+// secret.
 bool is_equal(std::string_view a, std::string_view b) {
   if (a.size() != b.size()) return false;
   int difference = 0;
@@ -51,7 +52,7 @@ bool is_equal(std::string_view a, std::string_view b) {
   return difference == 0;
 }
 
-// Returns the host name as browsers send it. Throws UsageError unless browsers could send it as a name or an address.
+// Returns the host name as browsers send it. Throws UsageError if browsers could not send it as a name or an address.
 std::string host_name_of(std::string name) {
   for (char& c : name) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
@@ -70,7 +71,7 @@ Text event_text(std::string_view event, const LiveJson& data) {
   return std::make_shared<const std::string>(fmt::format("event: {}\ndata: {}\n\n", event, json_text(data)));
 }
 
-/// Page that listens.
+/// A page that listens to events.
 struct Listener {
   std::deque<Text> waiting;
   size_t bytes = 0;
@@ -98,7 +99,7 @@ struct LiveServer::Parts {
     for (const std::string& name : {std::string("127.0.0.1"), std::string("localhost"), host_name}) {
       if (name.empty()) continue;
       hosts.push_back(fmt::format("{}:{}", name, port));
-      if (port == 80) hosts.push_back(name);  // as browsers write it
+      if (port == 80) hosts.push_back(name);  // browsers omit port 80
     }
   }
 
@@ -133,8 +134,9 @@ struct LiveServer::Parts {
     }
   }
 
-  // Rejects requests of other sites' pages, which can reach the loopback too: through names that they point at it,
-  // which Host reveals, and through requests of their own, which Origin reveals.
+  // Rejects requests of other sites' pages, which can also reach the loopback. A site may point its own name at the
+  // loopback, which the field Host reveals. Its pages may send requests to the loopback, which Origin and
+  // Sec-Fetch-Site reveal.
   void check_asker(const HttpRequest& request) const {
     const std::string host(request.value("host"));
     const auto is_served = [&] {
@@ -174,7 +176,7 @@ struct LiveServer::Parts {
     changed.notify_all();
   }
 
-  // Writes the next text. Returns whether the connection is still open.
+  // Writes the next waiting text, or a heartbeat. Returns whether the connection is still open.
   bool write_next(Listener& listener, HttpAnswer& answer) {
     Text text;
     {
@@ -194,9 +196,9 @@ struct LiveServer::Parts {
   }
 
   void take_request(const HttpRequest& request) {
-    // Forms of other sites cannot send this type without a preflight request.
+    // Pages of other sites cannot send this content type without a preflight request.
     std::string_view type = request.value("content-type");
-    type = type.substr(0, type.find_first_of("; "));  // without its character set
+    type = type.substr(0, type.find_first_of("; "));  // without the character set
     if (type != "application/json") throw HttpError{415, "expected Content-Type: application/json"};
     try {
       const LiveRequest asked = parse_live_request(request.body, options.num_agents);
@@ -209,7 +211,7 @@ struct LiveServer::Parts {
     changed.notify_all();
   }
 
-  // Queues a text; the mutex must be held.
+  // Queues a text for a page. The caller must hold the mutex.
   static void put(Listener& listener, const Text& text) {
     listener.bytes += text->size();
     listener.waiting.push_back(text);
@@ -236,7 +238,7 @@ struct LiveServer::Parts {
   std::vector<LiveRequest> requests;
   bool is_closing = false;
 
-  std::unique_ptr<HttpServer> server;  // destroyed before the data that its answers read
+  std::unique_ptr<HttpServer> server;  // last member: destroyed before the data that handlers read
 };
 
 LiveServer::LiveServer(const LiveServerOptions& options) : parts_(std::make_unique<Parts>(options)) {}
@@ -251,7 +253,7 @@ void LiveServer::send(std::string_view event, const std::function<LiveJson()>& m
     const std::lock_guard lock(parts_->mutex);
     if (std::none_of(parts_->listeners.begin(), parts_->listeners.end(), wants)) return;
   }
-  const Text text = event_text(event, message());  // outside the lock, since it takes time
+  const Text text = event_text(event, message());  // without the lock, because it takes time
   {
     const std::lock_guard lock(parts_->mutex);
     for (const auto& listener : parts_->listeners) {

@@ -33,8 +33,9 @@ std::string script_text(const nlohmann::ordered_json& json) {
 }
 
 std::string fill_template(std::string_view html, const std::vector<std::pair<std::string, std::string>>& values) {
-  // Names are searched in the template, not in values that have replaced other names.
-  std::map<size_t, std::pair<size_t, const std::string*>> places;  // by begin: length, and replacement
+  // Names are searched only in the template, not in the values that replace other names.
+  // Key: begin of a name. Value: its length, and its replacement.
+  std::map<size_t, std::pair<size_t, const std::string*>> places;
   for (const auto& [name, text] : values) {
     const std::string mark = "{{" + name + "}}";
     const size_t at = html.find(mark);
