@@ -19,7 +19,7 @@ namespace {
 
 void print_error(const std::string& message) { print_message("error: {}\n", printable(message)); }
 
-/// Runs the command line. Returns the exit status.
+/// Parses and runs the command line. Returns the exit status.
 int run(CLI::App& app, int argc, char** argv) {
   try {
     app.parse(argc, argv);
@@ -40,7 +40,7 @@ int run(CLI::App& app, int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     print_error("out of memory");
   } catch (const std::exception& error) {
-    // A library's message: lines after the first give the position in its code.
+    // The message comes from a library. Lines after the first contain positions in the library's code.
     std::string message = error.what();
     message.erase(std::min(message.find('\n'), message.size()));
     const bool lacks_memory =
@@ -61,7 +61,7 @@ int end_output(int status) {
   return status;
 }
 
-// What help says of training.
+// Parts of the help about training.
 #ifdef PICTURA_HAS_TORCH
 constexpr const char *kOfTraining = "training and evaluation.\n",
                      *kExamplesOfTraining =
@@ -80,7 +80,8 @@ constexpr const char *kOfTraining =
 int run_command(int argc, char** argv) {
   open_standard_streams();
   catch_interrupts();
-  // Writing beyond the file size limit (ulimit -f) then gives a write error instead of killing the process.
+  // Without SIGXFSZ, writing beyond the file size limit (ulimit -f) causes a write error instead of killing the
+  // process.
   std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app{
       std::string("Self-play driving from rendered views: maps, simulation, images, ") + kOfTraining +

@@ -1,4 +1,4 @@
-// `pictura completion`: scripts for shell completion of the command's words.
+// `pictura completion`: prints scripts for shell completion.
 #include "pictura/cli/completion.h"
 
 #include "pictura/apps/commands.h"

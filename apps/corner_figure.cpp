@@ -13,7 +13,7 @@ namespace pictura {
 
 namespace {
 
-constexpr int kDotSteps = 5;  // between dots of a path
+constexpr int kDotSteps = 5;  // steps between the dots of a path
 constexpr int kTopSize_px = 560, kRowGap_px = 8;
 constexpr float kCornerMargin_m = 8;
 constexpr Rgb kUserColor = rgb8(73, 80, 87);

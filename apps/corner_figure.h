@@ -1,4 +1,4 @@
-// Picture of `pictura probe corner`.
+// Draws the picture of `pictura probe corner`, which tests policies at blind corners.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace pictura {
 
-/// Draws the pair at whose reveal policies' speeds differ most (example_of()) from above, with walls and without, in
-/// the colours of the chart below. Throws Error naming the path.
+/// Draws the example pair of states (example_of()) from above, once with walls and once without, in the colours of the
+/// probe's chart. Throws Error, which names the path, if the picture cannot be written.
 void draw_corner_example(const CornerResults& results, const std::string& path);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// `pictura evaluate`: the paper's driving metrics of a checkpoint or a controller, by traffic density.
+// `pictura evaluate`: computes the paper's driving metrics of a checkpoint or a controller, for each traffic density.
 #include "pictura/evaluation/evaluate.h"
 
 #include <algorithm>
@@ -33,14 +33,14 @@ namespace pictura {
 
 namespace {
 
-constexpr int kShownGroups = 6;          // shown of each kind of infraction
-constexpr double kManyNeverMoved = 0.2;  // share of vehicles
+constexpr int kShownGroups = 6;          // maximum number of groups that are printed for each kind of infraction
+constexpr double kManyNeverMoved = 0.2;  // share of vehicles above which a notice is printed
 
-// Reports, one for each severity of randomized cameras.
+// Reports of an evaluation, one for each severity of randomized cameras.
 using Reports = std::vector<EvaluateReport>;
 
-// Row of the table with its label: the density; for another driver also its name, without the folders of a file; the
-// severity if there are several.
+// Row of the table with its label. The label contains the density, the name of another driver (without folders), and
+// the severity if there are several.
 struct LabelledRow {
   std::string label;
   EvaluateRow row;
@@ -71,7 +71,7 @@ Effort effort_of(const Reports& reports) {
   return sum;
 }
 
-// Prints a line of the table: a metric, and its text for each row.
+// Prints a line of the table: the name of a metric, and its text for each row.
 template <typename Text>
 void print_line(const std::vector<LabelledRow>& rows, size_t width, const char* metric, const Text& text_of) {
   std::string line = fmt::format("{:30}", metric);
@@ -79,8 +79,8 @@ void print_line(const std::vector<LabelledRow>& rows, size_t width, const char* 
   print_result("{}\n", line);
 }
 
-// Prints the metrics below each other, so that the table fits a terminal, with a column for each density, driver and
-// severity.
+// Prints a table with a line for each metric, and a column for each density, driver and severity. In this form the
+// table fits a terminal.
 void print_table(const Reports& reports) {
   const EvaluationSetting& setting = reports.front().results.setting;
   const std::vector<LabelledRow> rows = labelled(reports);
@@ -191,7 +191,7 @@ Json groups_json(const std::vector<InfractionGroup>& groups) {
   return list;
 }
 
-// Parses a range of scenarios. "N": 0 to N - 1; "A:B": A to B - 1.
+// Parses a range of scenarios. "N" means 0 to N - 1, and "A:B" means A to B - 1.
 void parse_scenarios(const std::string& text, EvaluateOptions* options) {
   const size_t colon = text.find(':');
   const std::string_view all = text;
@@ -204,7 +204,7 @@ void parse_scenarios(const std::string& text, EvaluateOptions* options) {
   options->scenarios = static_cast<int>(*end - *first);
 }
 
-// Names of controllers in towns, or in recorded scenes.
+// Returns the names of the controllers for towns, or for recorded scenes.
 std::vector<std::string> driver_names(bool has_scenes) {
   if (!has_scenes) return town_controller_names();
   std::vector<std::string> names = record_controller_names();
@@ -268,7 +268,7 @@ void evaluate_in_scenes(const CLI::App& command, const EvaluateArguments& argume
                        arguments.out, arguments.json);
 }
 
-// Records the worst scenarios again, if requested.
+// Simulates the worst scenarios again and writes their replays, if requested.
 void replay_worst(const EvaluateArguments& arguments, const EvaluationResults& results) {
   const EvaluateOptions& evaluation = arguments.evaluation;
   if (!arguments.replay.empty()) {
@@ -279,7 +279,7 @@ void replay_worst(const EvaluateArguments& arguments, const EvaluationResults& r
   }
 }
 
-// Rejects options that do not allow several severities, and severities with --merge.
+// Rejects --camera-severity with --merge, and several severities together with options that do not support them.
 void check_severities(const CLI::App& command, const EvaluateArguments& arguments) {
   if (!arguments.parts.empty()) reject_options(command, {"--camera-severity"}, "with --merge");
   if (arguments.severities.size() == 1) return;
@@ -287,7 +287,7 @@ void check_severities(const CLI::App& command, const EvaluateArguments& argument
                  "with several values of --camera-severity");
 }
 
-// Evaluates at each severity, in the same worlds, until an interrupt.
+// Evaluates at each severity, in the same worlds. Ends early after an interrupt.
 Reports evaluate_severities(const std::vector<double>& severities, EvaluateOptions* evaluation) {
   EvaluationProgress progress("the completed scenarios");
   const std::function<void(double, double)> update = [&progress](double done, double eta_s) {

@@ -1,4 +1,4 @@
-// `pictura export`: the weights of a policy without its run, for releases or other tools.
+// `pictura export`: writes the weights of a policy without the state of its run, for releases or other tools.
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/evaluation_options.h"

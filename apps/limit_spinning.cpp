@@ -1,8 +1,9 @@
-// Torch's loops run on libgomp, whose waiting threads spin for milliseconds. Beside one other busy process this makes
-// them ten times slower: threads that have used up their processor time by spinning are missing when work arrives.
-// GOMP_SPINCOUNT limits the spinning, but libgomp reads the environment once, before main and every constructor of the
-// program. So the command sets the variable, unless the environment already specifies how threads wait, and restarts
-// itself before libraries are initialised, which is most of the start-up time.
+// Limits the spinning of Torch's threads. Torch's loops run on libgomp, whose waiting threads spin for milliseconds. If
+// one other process is busy, this makes the loops ten times slower: threads use up their processor time by spinning,
+// and are suspended when work arrives. GOMP_SPINCOUNT limits the spinning. But libgomp reads the environment once,
+// before main() and all constructors of the program. So the command sets the variable and restarts itself, unless the
+// environment already specifies how threads wait. It restarts before libraries are initialised, because their
+// initialisation takes most of the start-up time.
 #include <array>
 #include <string_view>
 
@@ -12,8 +13,8 @@
 
 namespace {
 
-// About 40 us: the shortest limit that costs nothing on an idle machine (docs/research/benchmarks.md).
-// bindings/pictura/__init__.py sets the same value.
+// About 40 us of spinning. This is the shortest limit that costs no speed on an idle machine
+// (docs/research/benchmarks.md). bindings/pictura/__init__.py sets the same value.
 char spin_count[] = "GOMP_SPINCOUNT=2000";
 
 // Runs before the standard library is initialised.
@@ -23,7 +24,7 @@ void limit_spinning(int /*argc*/, char** argv, char** environment) {
     const std::string_view variable = environment[count];
     if (variable.starts_with("OMP_WAIT_POLICY=") || variable.starts_with("GOMP_SPINCOUNT=")) return;
   }
-  if (getauxval(AT_BASE) == 0) return;  // started through the dynamic linker
+  if (getauxval(AT_BASE) == 0) return;  // the command was started through the dynamic linker
   std::array<char, 4096> path;
   const ssize_t length = readlink("/proc/self/exe", path.data(), path.size() - 1);
   if (length <= 0) return;

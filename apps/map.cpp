@@ -1,4 +1,4 @@
-// `pictura map`: a map's properties, its elements, and its picture from above.
+// `pictura map`: prints a map's properties, lists its elements, and draws it from above.
 #include <algorithm>
 
 #include "pictura/apps/commands.h"
@@ -26,7 +26,7 @@ namespace pictura {
 
 namespace {
 
-constexpr double kQuiet_s = 0.3;  // faster imports show no progress
+constexpr double kQuiet_s = 0.3;  // imports show progress after this time
 
 struct MapArguments {
   std::string map, png, svg, xodr;
@@ -62,7 +62,7 @@ void add_lane_use(const RoadMap& map, Json* object_out) {
   (*object_out)["unreachable_lanes"] = use.unreachable;
 }
 
-/// Adds the counts of blind approaches, with the default walls of simulations.
+/// Adds the counts of blind approaches (blind_approaches.h) with the default walls of simulations.
 void add_blind_approaches(const RoadMap& map, Json* object_out) {
   const std::vector<WallFace> walls = make_walls(map, {});
   const BlindApproaches count = count_blind_approaches(map, walls);
@@ -111,7 +111,7 @@ void print_table(const Json& object) {
   }
 }
 
-/// Repairs by kind: how often, where first, and the message of each.
+/// Returns the repairs by kind: the fault, the action, the number of repairs, and all messages.
 Json repairs_of(const RoadMap& map, const std::string& source) {
   Json groups = Json::array();
   for (const RepairGroup& group : group_repairs(map.mends)) {
@@ -125,8 +125,8 @@ Json repairs_of(const RoadMap& map, const std::string& source) {
   return groups;
 }
 
-/// Reports on a recorded scene: the facts of its map, its tracks and lights, and the agreement of its traffic with its
-/// edges.
+/// Reports on a recorded scene: facts about its map, its tracks and its lights, and the agreement of its traffic with
+/// the road edges.
 void run_scene(const MapArguments& arguments) {
   if (!arguments.xodr.empty()) fail_usage("--xodr: {} is a recorded scene, which has no OpenDRIVE", arguments.map);
   SceneReport report;
@@ -236,7 +236,7 @@ void add_map_command(CLI::App& app) {
       ->check(file_ending(".xodr"));
   command->add_flag("--strict", arguments->strict,
                     "Reject every fault of the file, including faults that are repaired by default");
-  command->add_flag("--lenient")->group("");  // option of earlier versions: rejected with a hint to its replacement
+  command->add_flag("--lenient")->group("");  // option of earlier versions; it is rejected with a hint
   command->add_flag("--json", arguments->json, "Print one JSON object; its key mends lists every repaired fault");
   command->add_flag("--full", arguments->full, "With --json: list every element with its position in the file");
   command->footer(

@@ -28,7 +28,8 @@ Rgb mixed(Rgb a, Rgb b, float share_of_b) {
   return {a.r + (b.r - a.r) * share_of_b, a.g + (b.g - a.g) * share_of_b, a.b + (b.b - a.b) * share_of_b};
 }
 
-// Points of a path whose images are shown: hidden, first seen, best seen, last seen, and hidden again.
+// Returns the points of a path whose images are shown: where the pedestrian is hidden, first seen, best seen, last
+// seen, and hidden again.
 std::array<int32_t, 5> places_of(const PedestrianResults& results, const PedestrianPath& path) {
   const auto first = results.points.begin() + path.first_point;
   const auto less = [](const PedestrianPoint& a, const PedestrianPoint& b) {
@@ -65,7 +66,7 @@ class PathFigures {
     return page;
   }
 
-  /// Page of a path for pictura.plot.
+  /// Returns the page of a path for pictura.plot.
   Json page(size_t index, const std::string& picture) const {
     const PedestrianPath& path = results_.paths[index];
     const std::array<int32_t, 5> places = places_of(results_, path);
@@ -81,7 +82,7 @@ class PathFigures {
     return results_.points[path.first_point + at];
   }
 
-  /// Interpolates between the chart's colours of a pedestrian that is hidden, half visible and fully visible.
+  /// Interpolates between three colours of the chart, which mean hidden, half visible and fully visible.
   Rgb color_of(float visible_share) const {
     return visible_share < 0.5f ? mixed(colors_[0], colors_[1], 2 * visible_share)
                                 : mixed(colors_[1], colors_[2], 2 * visible_share - 1);

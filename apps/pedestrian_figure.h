@@ -1,4 +1,4 @@
-// Pictures of `pictura probe pedestrian`.
+// Draws the pictures of `pictura probe pedestrian`, which tests policies with pedestrians behind vehicles.
 #pragma once
 
 #include <functional>
@@ -9,9 +9,10 @@
 
 namespace pictura {
 
-/// Draws path_000.png and so on in a folder: a path from above, coloured by the pedestrian's visibility, and the ego's
-/// cameras at five points. `on_path` is called with the number of completed paths. Returns the pages for pictura.plot,
-/// which draws the changes along the path below the pictures. Throws Error naming the path.
+/// Writes a picture for each path (path_000.png, ...) into a folder. It shows the path from above, coloured by the
+/// pedestrian's visibility, and the ego's camera images at five points. Calls `on_path` with the number of completed
+/// paths. Returns the pages for pictura.plot, which draws a chart of each path below its picture. Throws Error, which
+/// names the file, if a picture cannot be written.
 Json draw_pedestrian_paths(const PedestrianResults& results, FilledFolder* folder,
                            const std::function<void(size_t)>& on_path);
 

@@ -1,4 +1,4 @@
-// `pictura plot`: curves of training runs, of evaluations during training, or of evaluations by severity, as one
+// `pictura plot`: draws curves of training runs, of evaluations during training, or of evaluations by severity into one
 // picture.
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"

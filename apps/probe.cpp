@@ -1,4 +1,5 @@
-// `pictura probe`: responses of policies to what their cameras see, and to what they do not.
+// `pictura probe`: measures the responses of policies to road users that their cameras see, and to road users that they
+// do not see.
 #include <algorithm>
 #include <array>
 #include <filesystem>
@@ -58,7 +59,7 @@ struct ProbeArguments {
   bool json = false;
 };
 
-/// Adds all options of a probe. `files` names the files that it writes.
+/// Adds all options of a probe. `files` names the files that the probe writes.
 template <typename Probe>
 void add_options(CLI::App* command, ProbeArguments<Probe>* arguments, const std::string& case_help,
                  const std::string& files, const std::array<const char*, 3>& examples) {
@@ -76,7 +77,7 @@ void add_options(CLI::App* command, ProbeArguments<Probe>* arguments, const std:
   command->footer(footer(examples));
 }
 
-// Runs a probe with a progress line, after creating the folder for its files.
+// Creates the folder for a probe's files, and runs the probe with a progress line.
 template <typename Results, typename Probe>
 Results run_probe(Results (*ask)(const Probe&), ProbeArguments<Probe>* arguments) {
   make_output_folder(arguments->out);
@@ -89,7 +90,7 @@ Results run_probe(Results (*ask)(const Probe&), ProbeArguments<Probe>* arguments
   return results;
 }
 
-/// Text of an estimate with one digit more than in evaluations, since changes of values are small.
+/// Returns the text of an estimate with one digit more than in evaluations, because changes of values are small.
 std::string interval_of(const Estimate& estimate) { return interval_text(estimate, 4); }
 
 size_t name_width(const ProbeResults& results) {
@@ -147,18 +148,19 @@ void print_table(const CornerResults& results, const std::vector<CornerRow>& row
       format_duration(results.seconds));
 }
 
-/// Draws the chart of a probe's means as `name`, and the charts below the pages, or prints a notice with the reason.
+/// Draws the chart of a probe's means as file `name`, and charts for `pages`. Without Matplotlib, prints a notice
+/// instead.
 void draw_charts(const std::string& name, const Json& pages, FilledFolder* out) {
   const std::string chart = out->file(name);
   try {
     draw_chart({{"chart", "probe_charts"}, {"folder", out->path()}, {"pages", pages}});
   } catch (const NoMatplotlib& error) {
-    std::filesystem::remove(chart);  // from an earlier call
+    std::filesystem::remove(chart);  // removes the chart of an earlier call
     print_message("notice: {}\n", error.what());
   }
 }
 
-/// Writes summary.json, draws the charts unless `pages` is null, and prints the summary or a table.
+/// Writes summary.json, draws charts if `pages` is not null, and prints the summary or a table.
 template <typename Probe, typename Results, typename Row>
 void report(const ProbeArguments<Probe>& arguments, const std::string& summary, const Results& results,
             const std::vector<Row>& rows, const Json& pages, FilledFolder* out) {

@@ -1,5 +1,4 @@
-// `pictura render`: writes camera images of a scene file, of a world driven with random actions, or of a recorded
-// scene.
+// `pictura render`: writes camera images of a scene file, of a world that random actions drive, or of a recorded scene.
 #include <cctype>
 #include <filesystem>
 
@@ -40,9 +39,9 @@ struct RenderArguments {
   bool size_given = false, square_pixels = false, figure = false, json = false;
 };
 
-/// Scene to draw, with file names, from a driven world or from a file.
+/// A scene to draw, from a simulated world or a file, with names for image files.
 struct Subject {
-  std::vector<StaticGeometry> geometries;  // handles are indices
+  std::vector<StaticGeometry> geometries;  // the handle of a geometry is its index
   SceneBatch scene;
   Span<const View> views;
   std::vector<std::string> names, captions;  // [views]
@@ -83,7 +82,7 @@ double draw(const Subject& subject, Renderer* renderer, HostImages* images_out) 
   return static_cast<double>(subject.views.size()) / seconds[2];
 }
 
-/// Writes the pictures. Returns the paths of the contact sheets.
+/// Writes the pictures. Returns the paths of the contact sheets, which are overviews of all views.
 std::vector<std::string> write_pictures(const RenderArguments& arguments, const Subject& subject, const Rig& rig,
                                         const HostImages& images, FilledFolder* out) {
   const auto check = [] {
@@ -150,7 +149,7 @@ void render_scene_file(const RenderArguments& arguments) {
                   renderer.get());
 }
 
-/// Renderer configuration of a map's worlds.
+/// Returns the renderer configuration for worlds on maps.
 RendererConfig config_of(const RenderArguments& arguments) {
   const Pair size = parse_pair("--size", arguments.size, 8192);
   if (!arguments.rig.empty() && arguments.size_given) fail_usage("--size: the rig of --rig has its own sizes");
@@ -179,11 +178,11 @@ void render_world(const RenderArguments& arguments) {
   draw_and_report(arguments, subject, renderer.get());
 }
 
-/// Tracks of a recorded scene whose views are drawn, in their order.
+/// Returns which tracks of a recorded scene are drawn, as [tracks].
 std::vector<uint8_t> viewed_tracks(const RenderArguments& arguments, const CompiledMap& map) {
   const Scenario& scenario = *map.scenario;
   if (arguments.tracks.empty() && scenario.sdc_track < 0) {
-    // The file does not mark a self-driving car.
+    // The file does not mark a self-driving car, so the first track is drawn.
     std::vector<uint8_t> first = tracks_of(scenario, "all", map.start_step);
     std::fill(std::find(first.begin(), first.end(), 1) + 1, first.end(), 0);
     return first;
@@ -214,7 +213,7 @@ void render_recorded_scene(const RenderArguments& arguments) {
   draw_and_report(arguments, subject, renderer.get());
 }
 
-// Rejects options whose values a scene file contains.
+// Rejects options of worlds, because a scene file determines its world.
 void reject_world_options(const CLI::App& command) {
   reject_options(command,
                  {"--agents", "--pedestrians", "--cyclists", "--parked", "--seed", "--no-walls", "--light-cycles",

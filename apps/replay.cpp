@@ -1,4 +1,5 @@
-// `pictura replay`: records episodes as pages that a browser plays, one as a file, or many with an index.
+// `pictura replay`: records episodes as pages that a browser plays. Writes one page, or a folder of pages with an
+// index.
 #include "pictura/apps/commands.h"
 #include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
@@ -78,7 +79,7 @@ void run_replay(const ReplayArguments& arguments) {
       replays.push_back(facts_of(path, replay));
     }
   } catch (const Interrupted&) {
-    if (!replays.empty()) write_index(&pages);  // index of the completed replays
+    if (!replays.empty()) write_index(&pages);  // lists the completed replays
     throw;
   }
   write_index(&pages);

@@ -14,14 +14,14 @@ namespace pictura {
 
 namespace {
 
-// Ratio of a condition's goals to those of the first condition; NaN if the first has none.
+// Returns the ratio of a condition's goals to those of the first condition, or NaN if the first condition has none.
 double goals_kept(const RobustReport& report, const EvaluateRow& row) {
   return row.goals_per_vehicle.value / report.metrics(report.rows.front()).goals_per_vehicle.value;
 }
 
 std::string number_text(double value) { return std::isfinite(value) ? fmt::format("{:.2f}", value) : "-"; }
 
-// Prints a row's name and its texts in columns; the first column of texts is wider.
+// Prints a row's name and its texts in columns. The first column of texts is wider than the others.
 void print_columns(const std::string& name, const std::vector<std::string>& texts) {
   std::string line = fmt::format("{:24}", name);
   for (size_t i = 0; i < texts.size(); ++i) line += fmt::format(" {:>{}}", texts[i], i == 0 ? 18 : 11);

@@ -1,4 +1,4 @@
-// `pictura evaluate --protocol robust`: its table and its JSON.
+// Runs `pictura evaluate --protocol robust`.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -7,8 +7,9 @@
 
 namespace pictura {
 
-/// Evaluates the driver of `options` in all conditions, and prints a table, or one JSON object. Throws UsageError for
-/// options of the command that the protocol fixes. After ^C, prints the finished conditions and throws Interrupted.
+/// Evaluates the driver of `options` in all conditions of the protocol, and prints a table, or one JSON object if
+/// `json`. Throws UsageError for options of the command that the protocol fixes. After an interrupt, prints the
+/// completed conditions and throws Interrupted.
 void run_robust_evaluation(const CLI::App& command, const EvaluateOptions& options, bool json);
 
 }  // namespace pictura

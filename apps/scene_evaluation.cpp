@@ -67,7 +67,7 @@ void print_table(const SceneEvaluation& evaluation) {
                60 * results.scored() / evaluation.seconds);
 }
 
-// Prints a report. The duration of merged parts is unknown.
+// Prints a report, without the duration if it is unknown, as for merged parts.
 void print_report(const DriverOptions& options, const SceneEvaluation& evaluation) {
   const SceneResults& results = evaluation.results;
   const SceneProtocol& protocol = results.protocol;

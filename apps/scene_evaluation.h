@@ -1,4 +1,4 @@
-// `pictura evaluate --protocol`: evaluations in recorded scenes, with their reports.
+// Evaluations of `pictura evaluate --protocol` in recorded scenes, and their reports.
 #pragma once
 
 #include <optional>
@@ -11,9 +11,9 @@
 
 namespace pictura {
 
-/// Arguments of evaluations in scenes, besides the options of every evaluation.
+/// Arguments of evaluations in recorded scenes, in addition to the options of all evaluations.
 struct SceneArguments {
-  std::string protocol;  // empty: no recorded scenes
+  std::string protocol;  // name of the protocol; empty: no recorded scenes
   std::vector<std::string> scenes, rules;
   std::string control, csv, rollouts, realism;
   std::optional<int> start_step;
@@ -22,17 +22,19 @@ struct SceneArguments {
 /// Adds --protocol, --scenes, --control, --start, --rule, --csv, --rollouts and --realism.
 void add_scene_options(CLI::App* command, SceneArguments* arguments);
 
-/// Throws UsageError for options that have no effect with, or without, --protocol.
+/// Throws UsageError for options that have no effect: options for towns if --protocol was given, and options for scenes
+/// if it was not.
 void reject_idle_scene_options(const CLI::App& command, const SceneArguments& arguments);
 
-/// Evaluates and prints a table, or one JSON object. densities: shares in %, or the protocol's if --density was not
-/// given. `options` holds the driver and the range of scenes. out: a file for later merging, or empty. After an
-/// interrupt it prints the completed results and throws Interrupted.
+/// Evaluates in recorded scenes, and prints a table, or one JSON object if `json`. `densities` are shares of driven
+/// road users in %; they are the protocol's if --density was not given. `options` contains the driver and the range of
+/// scenes. `out` is a file for later merging, or empty. After an interrupt, prints the completed results and throws
+/// Interrupted.
 void run_scene_evaluation(const CLI::App& command, const SceneArguments& arguments, int steps,
                           const std::vector<std::string>& densities, SceneEvaluateOptions options,
                           const std::string& out, bool json);
 
-/// Merges the parts of an evaluation in scenes, and prints and writes the result like a single evaluation.
+/// Merges the parts of an evaluation in recorded scenes. Prints and writes the result as for a single evaluation.
 void merge_scene_evaluations(const std::vector<std::string>& paths, const std::string& out, bool json);
 
 }  // namespace pictura

@@ -1,4 +1,5 @@
-// `pictura score`: realism of a file's rollouts, compared with the recorded scenes in which they begin.
+// `pictura score`: computes the realism of a file's rollouts by comparison with the recorded scenes in which they
+// begin.
 #include "pictura/apps/commands.h"
 #include "pictura/apps/realism_table.h"
 #include "pictura/cli/interval_text.h"

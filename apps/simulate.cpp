@@ -1,4 +1,4 @@
-// `pictura simulate`: drives one world with a policy, counts what happens, and films it from above and from the
+// `pictura simulate`: simulates one world with a policy, counts events, and films the world from above and through the
 // cameras.
 #include <algorithm>
 #include <array>
@@ -50,7 +50,7 @@ std::array<int64_t, kNumAgentClasses> spawned_by_class(Simulator& simulator) {
   return counts;
 }
 
-/// Distance of driven agents from their recorded positions, over all their recorded steps.
+/// Distances of driven agents from their recorded positions, over all recorded steps of these agents.
 struct Displacement {
   int64_t steps = 0;
   double sum_m = 0, max_m = 0;
@@ -84,13 +84,14 @@ void reject_idle_options(const CLI::App& command, const SimulateArguments& argum
   reject_idle_backend_options(command, arguments.policy);
 }
 
-/// Number of lives after the first of a slot, and of lives that ended by leaving, on roads that end, over all episodes.
+/// Counts agents that entered and left the map, over all episodes, on maps whose roads end. Agents that are present at
+/// the start of an episode do not count as entered.
 class LifeCounter {
  public:
   void add(const Simulator& simulator) {
     if (!simulator.maps()[0]->rules.is_open) return;
     const SpawnReport now = simulator.spawn_report();
-    if (now.left < current_.left) {  // another episode
+    if (now.left < current_.left) {  // a new episode has begun
       entered_ += current_.entered;
       left_ += current_.left;
     }
@@ -104,7 +105,7 @@ class LifeCounter {
   int64_t entered_ = 0, left_ = 0;
 };
 
-/// Duration of steps; of the simulator alone if it is the last observer.
+/// Measures the duration of steps. As the last observer, it measures only the simulator.
 class StepClock final : public StepObserver {
  public:
   void before_step(Span<const Command>) override { watch_.restart(); }
@@ -116,7 +117,7 @@ class StepClock final : public StepObserver {
   double seconds_ = 0;
 };
 
-/// Counts over steps for the report.
+/// Counts over all steps for the report.
 class StepCounter final : public StepObserver {
  public:
   StepCounter(Simulator& simulator, const Scenario* scene) : simulator_(simulator), scene_(scene) {}
@@ -134,10 +135,11 @@ class StepCounter final : public StepObserver {
 };
 
 struct SimulationRun {
-  SpawnReport spawned;  // in the first episode, as the counts by class
+  SpawnReport spawned;  // in the first episode, like the counts by class
   std::array<int64_t, kNumAgentClasses> of_class{};
   int steps = 0;
-  double drive_s = 0, simulate_s = 0;  // without filming, recording and serving; of the simulator alone
+  // Durations: all work except filming, recording and serving; and the simulator alone.
+  double drive_s = 0, simulate_s = 0;
 };
 
 void print_simulation(const SimulationRun& run, const StepCounter& counted, const DrivenWorld& world, bool json) {
@@ -243,7 +245,7 @@ void run_simulate(SimulateArguments arguments) {
   run.drive_s += run.simulate_s;
   line.finish();
   if (live) live->finish();
-  if (film && steps > 0) film->close();  // an interrupt may come before the first frame
+  if (film && steps > 0) film->close();  // after an early interrupt, there is no frame
   if (recording) {
     const Replay replay = recording->finish();
     if (!arguments.replay.empty()) write_replay_with_message(arguments.replay, replay);

@@ -1,4 +1,4 @@
-// `pictura train`: self-play PPO from a configuration file, with a progress line.
+// `pictura train`: trains a policy by self-play PPO from a configuration file, with a progress line.
 #include "pictura/apps/commands.h"
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/number_options.h"

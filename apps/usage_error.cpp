@@ -11,7 +11,7 @@ namespace pictura {
 
 namespace {
 
-// Build options that subcommands need; looked up only for subcommands that this build lacks.
+// Returns the build option that each optional subcommand needs. It is used only for subcommands that this build lacks.
 const std::map<std::string, std::string>& needs_of_commands() {
   static const std::map<std::string, std::string> kNeeds = [] {
     std::map<std::string, std::string> needs;
@@ -52,7 +52,7 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error) {
     name += " " + command->get_name();
   }
   const std::string see = fmt::format("(see {} --help)", name);
-  // Subcommands pass unknown words to the parent command.
+  // The parent command has the unknown words of its subcommands.
   const std::vector<std::string> unknown = app.remaining(/*recurse=*/true);
   if (unknown.empty()) return fmt::format("{} {}", error.what(), see);
   const std::string& word = unknown.front();

@@ -7,8 +7,8 @@
 
 namespace pictura {
 
-/// Returns one line about the error of parse(). An unknown word comes before anything missing or wrong, with the
-/// nearest known word or the reason why this build lacks it.
+/// Returns a line that describes the error of parse(). An unknown word takes precedence over other errors. The line
+/// then contains the nearest known word, or the reason why this build lacks the word.
 std::string usage_error(const CLI::App& app, const CLI::ParseError& error);
 
 }  // namespace pictura

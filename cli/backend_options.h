@@ -10,16 +10,16 @@
 
 namespace pictura {
 
-/// Validator that accepts only these names; its error lists them.
+/// Returns a validator that accepts only these names. Its error message lists them.
 CLI::Validator one_of(const std::vector<std::string>& names);
 
-/// Adds --simulator, --renderer (or --backend) and --samples, whose help names `otherwise` as the default.
+/// Adds --simulator, --renderer (or --backend) and --samples. Their help describes the default as `otherwise`.
 void add_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out);
 
-/// Adds the options of add_backend_options() and --device, the policy's device.
+/// Adds the options of add_backend_options(), and --device for the policy's device.
 void add_policy_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out);
 
-/// Returns the non-empty options as overrides of a training configuration.
+/// Returns the options that were given as overrides of a training configuration.
 std::vector<std::string> overrides_of(const SessionOptions& options);
 
 }  // namespace pictura

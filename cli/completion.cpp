@@ -15,10 +15,10 @@ namespace {
 struct Word {
   std::string text, help;
   bool takes_value = false;
-  std::vector<std::string> values;  // possible values; files are offered beside them
+  std::vector<std::string> values;  // possible values, which are offered in addition to files
 };
 
-/// Command of the tree, with the words that may follow it.
+/// A command of the tree, with the words that may follow it.
 struct Place {
   std::string path;  // for instance "pictura bench render"
   std::vector<Word> commands, options;
@@ -27,7 +27,7 @@ struct Place {
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-/// Words in the braces of a type's name, as CLI11 writes a set of choices: "TEXT:{u8,f16}".
+/// Returns the choices in a type's name. CLI11 writes them in braces, such as "TEXT:{u8,f16}".
 std::vector<std::string> choices_of(const std::string& type_name) {
   const size_t begin = type_name.find('{'), end = type_name.find('}');
   if (begin == std::string::npos || end == std::string::npos) return {};
@@ -46,7 +46,7 @@ std::vector<std::string> keys_with_sign() {
   return words;
 }
 
-/// Possible values of an option, by the option's name.
+/// Returns the possible values of an option, from its type or its name.
 std::vector<std::string> values_of(const CLI::Option& option) {
   if (const std::vector<std::string> choices = choices_of(option.get_type_name()); !choices.empty()) return choices;
   const std::string name = option.get_single_name();
@@ -89,14 +89,14 @@ std::string in_fish_quotes(const std::string& text) {
   return result + "'";
 }
 
-/// Returns the `case` patterns of all commands below the program.
+/// Returns the `case` patterns of all subcommands.
 std::string known_paths(const std::vector<Place>& places) {
   std::string paths;
   for (size_t i = 1; i < places.size(); ++i) paths += (i > 1 ? " | " : "") + in_quotes(places[i].path);
   return paths;
 }
 
-/// Returns the `case` items that set `values` to the possible values of an option, by command and option.
+/// Returns the `case` items that set `values` to the possible values of the current command and option.
 std::string value_cases(const std::vector<Place>& places) {
   std::map<std::string, std::string> patterns_of_values;
   for (const Place& place : places) {
@@ -150,7 +150,7 @@ complete -o default -F _{0} {0}
 }
 
 std::string zsh_script(const std::string& name, const std::vector<Place>& places) {
-  // A colon separates the word from its help.
+  // A colon separates a word from its help.
   const auto entries = [](const std::vector<Word>& words) {
     std::string list;
     for (const Word& word : words) list += " " + in_quotes(word.text + ":" + word.help);

@@ -1,4 +1,4 @@
-// Scripts for shell completion of the command's words, generated from the tree of its subcommands and options.
+// Generates scripts for shell completion from the tree of the command's subcommands and options.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// Returns the script for "bash", "zsh" or "fish". Throws UsageError for another shell.
+/// Returns the script for "bash", "zsh" or "fish". Throws UsageError for other shells.
 std::string completion_script(const CLI::App& app, const std::string& shell);
 
 }  // namespace pictura

@@ -36,7 +36,7 @@ std::string python_for_charts() {
   return !built_with.empty() && ::access(built_with.c_str(), X_OK) == 0 ? built_with : "python3";
 }
 
-/// Opens an unnamed file that holds plot.py, at its beginning.
+/// Opens an unnamed file with the text of plot.py, positioned at its beginning.
 void open_source(Descriptor* source_out) {
   const std::string_view text = chart_source::plot_py();
   source_out->reset(::memfd_create("plot.py", MFD_CLOEXEC));
@@ -46,7 +46,7 @@ void open_source(Descriptor* source_out) {
                 "charts: cannot allocate memory for plot.py: {}", std::strerror(errno));
 }
 
-/// Python process that runs plot.py; ended by the destructor.
+/// Python process that runs plot.py. The destructor ends the process.
 class Plotter {
  public:
   Plotter(const std::string& python, std::string request) {
@@ -62,14 +62,14 @@ class Plotter {
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, source.get(), STDIN_FILENO);
     posix_spawn_file_actions_adddup2(&actions, child_end.get(), STDERR_FILENO);
-    // Runs in its own process group, so that this process handles ^C in a terminal.
+    // The child runs in its own process group, so that only this process receives ^C in a terminal.
     posix_spawnattr_t attributes;
     posix_spawnattr_init(&attributes);
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
     posix_spawnattr_setpgroup(&attributes, 0);
     std::string name = python, script = "-", safe_path = "PYTHONSAFEPATH=1";
     char* const arguments[] = {name.data(), script.data(), request.data(), nullptr};
-    // Excludes the working directory from the module search path.
+    // The first variable excludes the working directory from the module search path.
     std::vector<char*> environment{safe_path.data()};
     for (char** variable = environ; *variable; ++variable) environment.push_back(*variable);
     environment.push_back(nullptr);
@@ -91,7 +91,7 @@ class Plotter {
   Plotter(const Plotter&) = delete;
   Plotter& operator=(const Plotter&) = delete;
 
-  /// Returns the process's stderr output until it ends. Throws Interrupted.
+  /// Reads the process's stderr until its end, and returns the text. Throws Interrupted.
   std::string read_messages() {
     std::string messages;
     char buffer[4096];
@@ -113,7 +113,7 @@ class Plotter {
   }
 
  private:
-  const InterruptibleWork work_{"interrupted while a chart was drawn"};  // created before the child runs
+  const InterruptibleWork work_{"interrupted while a chart was drawn"};  // created before the child starts
   pid_t child_ = -1;
   Descriptor messages_;
 };

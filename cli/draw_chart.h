@@ -1,5 +1,5 @@
-// Charts, drawn by bindings/pictura/plot.py with Matplotlib. This program contains that file's text and runs it with a
-// Python interpreter.
+// Draws charts with bindings/pictura/plot.py, which uses Matplotlib. This program contains the text of plot.py, and
+// runs it with a Python interpreter.
 #pragma once
 
 #include <string_view>
@@ -11,18 +11,20 @@
 
 namespace pictura {
 
-/// Error thrown if there is no Python, or no Matplotlib; explains how to install it, and where the chart's data is.
+/// Error thrown if Python or Matplotlib is missing. Its message explains how to install them, and where the chart's
+/// data is.
 class NoMatplotlib : public Error {
  public:
   using Error::Error;
 };
 
-/// Runs plot.py on a request: a chart's name ("chart") and arguments, the name of the picture ("out") and the text to
-/// print ("report"). The interpreter is $PICTURA_PYTHON, else that of the virtual environment that this program was
-/// built with, else python3. Throws Error with plot.py's message, NoMatplotlib, or Interrupted.
+/// Runs plot.py on a request, which contains a chart's name ("chart") and arguments, and optionally the name of the
+/// picture ("out") and the text to print ("report"). The interpreter is $PICTURA_PYTHON if set, else the interpreter of
+/// the virtual environment with which this program was built, else python3. Throws Error with plot.py's message,
+/// NoMatplotlib, or Interrupted.
 void draw_chart(const Json& request);
 
-/// Colours of a list in plot.py, such as SERIES_COLORS, for pictures beside charts.
+/// Returns the colours of a list in plot.py, such as SERIES_COLORS, for pictures that accompany charts.
 std::vector<Rgb> chart_colors(std::string_view name);
 
 }  // namespace pictura

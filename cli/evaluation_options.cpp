@@ -45,7 +45,7 @@ CLI::Option* add_average_option(CLI::App* command, bool* average_out) {
 }
 
 void EvaluationProgress::update(double done, double eta_s) {
-  // Prints the notice for a long evaluation once a few seconds allow an estimate.
+  // After a few seconds, which allow an estimate, prints the notice about a long evaluation.
   constexpr double kEstimateAfter_s = 5, kLong_s = 600;
   const double elapsed_s = since_start_.seconds();
   if (!has_estimate_ && elapsed_s >= kEstimateAfter_s) {

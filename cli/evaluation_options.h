@@ -1,4 +1,4 @@
-// Options of commands that drive evaluation worlds: worlds and devices.
+// Options of commands that simulate evaluation worlds: options of the worlds and devices.
 #pragma once
 
 #include <chrono>
@@ -23,10 +23,11 @@ CLI::Option* add_sampled_option(CLI::App* command, bool* argmax_out);
 /// Adds --average, which selects the average of weights that a checkpoint holds.
 CLI::Option* add_average_option(CLI::App* command, bool* average_out);
 
-/// Reports the progress of an evaluation. For a long one it also prints, once, the expected time and how to shorten it.
+/// Reports the progress of an evaluation. For a long evaluation, also prints once the expected time and how to shorten
+/// it.
 class EvaluationProgress {
  public:
-  /// `finished` names the result reported after an interrupt: "the completed scenarios".
+  /// `finished` names the results that are reported after an interrupt, such as "the completed scenarios".
   explicit EvaluationProgress(std::string finished) : finished_(std::move(finished)) {}
   void update(double done, double eta_s);
   void finish() { line_.finish(); }
@@ -38,7 +39,7 @@ class EvaluationProgress {
   bool has_estimate_ = false;
 };
 
-/// First keys of evaluation reports: the driver and its devices.
+/// Returns the first keys of evaluation reports, which describe the driver and its devices.
 Json driver_json(const DriverOptions& options, const EvaluationSetting& setting);
 
 }  // namespace pictura

@@ -47,7 +47,8 @@ bool is_among(const Names& names, const CLI::Option* option) {
   return std::find(names.begin(), names.end(), option->get_name()) != names.end();
 }
 
-/// Path of the regular file that a text names, existing or not; empty if it names anything else.
+/// Returns the path of the regular file that a text names, even if it does not exist yet. Returns an empty text for
+/// devices, folders and others.
 std::string file_named(const std::string& text) {
   std::error_code error;
   const fs::file_status status = fs::status(text, error);
@@ -58,7 +59,7 @@ std::string file_named(const std::string& text) {
 }  // namespace
 
 void reject_shared_files(const CLI::App& app) {
-  std::map<std::string, std::string> name_of_file;  // name of the option
+  std::map<std::string, std::string> name_of_file;  // key: file; value: name of the option
   for (const bool writes : {false, true}) {
     for (const CLI::Option* option : app.get_options()) {
       if (writes ? !is_among(kOutputs, option) : !is_among(kInputs, option)) continue;

@@ -7,18 +7,21 @@
 
 namespace pictura {
 
-/// Validator that accepts names that end in `ending`, such as .png, or in `other`, if it is given, and names without
-/// ending, such as devices. So no file gets the ending of another format.
+/// Returns a validator of file names, so that no file gets the ending of another format. It accepts names that end in
+/// `ending` (such as .png), names that end in `other` (if it is not empty), and names without an ending, such as
+/// devices.
 CLI::Validator file_ending(const std::string& ending, const std::string& other = "");
 
-/// Adds MAP, which may be a recorded scene; `more` names further kinds.
+/// Adds the argument MAP, which may be a map or a recorded scene. `more` describes other kinds of MAP for the help.
 void add_map_or_scene(CLI::App* command, std::string* map_out, const std::string& more = "");
 
-/// Rejects a command if two of its options write the same file, or one option writes the policy or the rig that another
-/// option reads. Devices may be shared; maps and scenes may be replaced.
+/// Throws UsageError if two options of a command write the same file, or if an option writes the policy or the rig that
+/// another option reads. Several options may write one device, and an option may replace the map or scene that the
+/// command reads.
 void reject_shared_files(const CLI::App& app);
 
-/// Rejects empty texts for all options of a command and its subcommands, since an empty text would count as not given.
+/// Makes all options of a command and its subcommands reject empty texts, because an empty text would mean that the
+/// option was not given.
 void reject_empty_values(CLI::App* command);
 
 }  // namespace pictura

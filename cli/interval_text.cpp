@@ -9,7 +9,7 @@ namespace pictura {
 std::string interval_text(const Estimate& estimate, int decimals) {
   if (!std::isfinite(estimate.value)) return "-";
   const std::string value = fmt::format("{:.{}f} +- ", estimate.value, decimals);
-  // One scenario gives no interval.
+  // A single scenario has no interval.
   if (!std::isfinite(estimate.half_width_95)) return value + "-";
   return value + fmt::format("{:.{}f}", estimate.half_width_95, decimals);
 }

@@ -13,7 +13,7 @@ namespace pictura {
 
 namespace {
 
-/// Rounds to the millimetre: floats near their origin are not more precise, and meaningless digits are hard to read.
+/// Rounds to millimetres, because floats are not much more precise and additional digits would be hard to read.
 double rounded(double metres) { return std::round(metres * 1e3) / 1e3; }
 
 class Listing {
@@ -23,7 +23,7 @@ class Listing {
     text_ += ",\n  \"elements\": {";
   }
 
-  /// Appends an array; describe(i) returns element i, to which its index and source are added.
+  /// Appends an array of `count` elements. describe(i) returns element i; its index and source are added.
   void add(const char* kind, size_t count, const std::vector<SourceElement>& sources,
            const std::function<Json(size_t)>& describe) {
     text_ += fmt::format("{}\n    \"{}\": [", text_.back() == '{' ? "" : ",", kind);

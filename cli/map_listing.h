@@ -1,4 +1,4 @@
-// List of every element of a map with its source in the file, for `pictura map --json --full`.
+// Lists every element of a map with its source in the file, for `pictura map --json --full`.
 #pragma once
 
 #include "pictura/cli/report.h"
@@ -6,9 +6,9 @@
 
 namespace pictura {
 
-/// Prints one JSON object: the keys of `facts`, then `elements` with one array for each vector of RoadMap and one
-/// element per line. Positions are in the file's metres, indices those of the arrays. `source` holds what is known of
-/// an element's road, line in the file, section and lane.
+/// Prints one JSON object. It contains the keys of `facts`, then `elements`, with an array for each vector of RoadMap
+/// and one element per line. Positions are file coordinates in metres, and indices refer to the arrays. `source`
+/// contains the element's road, line in the file, section and lane, as far as they are known.
 void print_listing(const Json& facts, const RoadMap& map);
 
 }  // namespace pictura

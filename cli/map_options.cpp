@@ -8,13 +8,13 @@ namespace pictura {
 
 namespace {
 
-// Whether a piece is NAME=VALUE, which cannot be the name of a map.
+// Whether a piece has the form NAME=VALUE, so that it cannot be the name of a map.
 bool is_option_of_town(const std::string& piece) {
   const std::size_t equals = piece.find('=');
   return equals != std::string::npos && piece.find_first_of(":/") > equals;
 }
 
-// The longitude behind FILE.osm@LATITUDE.
+// Whether the piece after `before` is a longitude: `before` ends with FILE.osm@LATITUDE.
 bool is_longitude_after(const std::string& before) {
   const std::size_t place = before.rfind(".osm@");
   return place != std::string::npos && before.find(',', place) == std::string::npos;

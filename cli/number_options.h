@@ -1,5 +1,5 @@
-// Options that take numbers, read by the project's single number parser (common/support/numbers.h). CLI11's own parser
-// reads 010 as octal, wraps -1, saturates 2^64, and accepts NaN in any range.
+// Options that take numbers. The parser of common/support/numbers.h reads them, because CLI11's own parser reads 010 as
+// octal, wraps -1, saturates 2^64, and accepts NaN in any range.
 #pragma once
 
 #include <cstdint>
@@ -14,15 +14,15 @@ namespace pictura {
 
 constexpr uint64_t kMaxCount = std::numeric_limits<int>::max();
 
-/// Validator that accepts whole numbers from low to high, inclusive, in any decimal notation. For Option::transform():
-/// CLI11 then reads the plain digits.
+/// Returns a validator that accepts whole numbers from low to high, inclusive, in any decimal notation. Pass it to
+/// Option::transform(), so that CLI11 reads only plain digits.
 CLI::Validator whole_number(uint64_t low, uint64_t high = kMaxCount);
 
-/// Validator that accepts finite numbers from low to high, inclusive. For Option::transform().
+/// Returns a validator that accepts finite numbers from low to high, inclusive. Pass it to Option::transform().
 CLI::Validator number(double low, double high);
 
-/// Adds an option that takes numbers from low to high, whole numbers for an integer. The help shows the default, unless
-/// there is none. A default out of range means "not given", and is not shown either.
+/// Adds an option that takes a number from low to high, and a whole number if T is an integer type. The help shows the
+/// default value of `value`. A default out of range means "not given", and the help does not show it.
 template <typename T>
 CLI::Option* add_number_option(CLI::App* command, const std::string& flag, T& value, const std::string& help,
                                double low, double high = kMaxCount) {
@@ -39,7 +39,7 @@ CLI::Option* add_number_option(CLI::App* command, const std::string& flag, T& va
 /// Adds --seed, any unsigned 64-bit number.
 CLI::Option* add_seed_option(CLI::App* command, uint64_t* seed_out, const std::string& help);
 
-/// Adds --threads, from 0 (all) to kMaxThreads.
+/// Adds --threads, from 0 (all processors) to kMaxThreads.
 CLI::Option* add_threads_option(CLI::App* command, int* num_threads_out);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Command-line flags of the options that structs list.
+// Command-line flags for lists of options. Structs define such a list by a function visit_options().
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@
 
 namespace pictura {
 
-/// Visitor of option lists that adds their flags to a command.
+/// Visitor of a list of options. It adds a flag for each option to a command.
 class FlagAdder {
  public:
   explicit FlagAdder(CLI::App* command) : command_(command) {}

@@ -11,9 +11,9 @@ namespace pictura {
 
 /// Adds --follow and --cameras.
 void add_recording_options(CLI::App* command, RecordingOptions* options_out);
-/// Adds --cameras alone, for replays whose followed agent is fixed.
+/// Adds only --cameras, for replays whose followed agent cannot be chosen.
 CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out);
-/// Throws UsageError if the command was given one of these options, which have no effect without `needed`.
+/// Throws UsageError if one of these options was given, because they have no effect without the option `needed`.
 void reject_recording_options(const CLI::App& command, const std::string& needed);
 
 }  // namespace pictura

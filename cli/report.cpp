@@ -41,8 +41,8 @@ std::string format_count(double value) {
 
 namespace {
 
-/// Returns the part of a line that can be rewritten in place, since wrapped lines remain; the whole line if stderr has
-/// no width.
+/// Returns the part of a line that fits the width of the terminal, because a wrapped line cannot be rewritten in place.
+/// Returns the whole line if stderr has no width.
 std::string shown(const std::string& line) {
   winsize size{};
   const bool has_width = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;

@@ -9,7 +9,7 @@ namespace pictura {
 
 namespace {
 
-/// Whether a text is what CLI11 passes for an option without a value, in its versions.
+/// Whether CLI11 passes this text for an option without a value. Versions of CLI11 differ.
 bool is_no_port(const std::string& text) { return text.empty() || text == "true"; }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The option `--serve`.
+// Options of commands that show a live view.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -7,11 +7,12 @@
 
 namespace pictura {
 
-/// Text of the progress line, most important numbers first, since a terminal cuts off the end: time left, the last
-/// minute's rate, return, and driving statistics of the last update. Infractions are collisions at fault, off-roads and
-/// red lights.
+/// Returns the text of the progress line. The most important numbers come first, because a terminal cuts off the end:
+/// remaining time, agent-steps per second of the last minute, return, and driving statistics of the last update.
+/// Infractions are collisions at fault, leaving the road, and red lights.
 std::string progress_text(const TrainProgress& progress);
-/// Shares of each phase, and of the rest, in the update's wall time: "simulate 4 %, render 31 %, ..., other 4 %".
+/// Returns the share of each phase, and of the rest, in the wall time of an update, such as "simulate 4 %, render 31 %,
+/// ..., other 4 %".
 std::string phase_shares(const TrainProgress& progress);
 
 }  // namespace pictura

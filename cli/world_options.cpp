@@ -14,7 +14,8 @@ namespace pictura {
 void add_world_options(CLI::App* command, WorldOptions* options_out) {
   add_number_option(command, "--agents", options_out->agents, "Vehicles, cyclists and pedestrians in the world", 1,
                     kMaxAgentsPerWorld);
-  // A value that the command presets is its default; otherwise the policy's training decides, or the simulator.
+  // The default is the value that the command presets if there is one, else the value of the policy's training, else
+  // the simulator's default.
   const SimulatorConfig simulator;
   auto with_default = [](const char* what, auto preset, auto simulators) {
     return fmt::format("{}; default: {}{}", what, preset.value_or(simulators),

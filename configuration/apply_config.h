@@ -1,4 +1,4 @@
-// Settings of cameras, renderers and simulators from a configuration.
+// Derives the settings of cameras, renderers and simulators from a configuration.
 #pragma once
 
 #include "pictura/common/camera.h"
@@ -8,25 +8,25 @@
 
 namespace pictura {
 
-/// Returns the configuration in force after `agent_steps`, with sizes, policy.patch_px and render.line_floor_px from
-/// render.schedule.
+/// Returns the configuration that applies after `agent_steps` agent-steps of a run. Image sizes, policy.patch_px and
+/// render.line_floor_px follow render.schedule.
 Config config_at(const Config& config, int64_t agent_steps);
 
-/// Returns the whole number by which `to` is wider and higher than `from`; 0 if there is none.
+/// Returns the whole number that multiplies the width and height of `from` to those of `to`, or 0 if there is none.
 int whole_factor(ImageSize from, ImageSize to);
 
-/// Returns the rig of the render section for a run after `agent_steps`.
+/// Returns the rig (cameras) of the render section after `agent_steps` agent-steps of a run.
 Rig rig_of(const Config& config, int64_t agent_steps = 0);
 
-/// Returns the settings of the renderer: all image settings that the policy depends on, and `rig`, a rig of the
-/// configuration's run. `device` is the network's device.
+/// Returns the settings of the renderer: `rig`, which must come from rig_of(), and all other image settings. `device`
+/// is the network's device.
 RendererConfig renderer_config(const Config& config, const Rig& rig, Device device = {});
 
-/// Returns the settings of the simulator for training, with entity sets only for the vector modality.
+/// Returns the settings of the simulator for training. Vector observations are only enabled for a vector policy.
 SimulatorConfig simulator_config(const Config& config, Device device = {});
 
-/// Returns the settings of the simulator for evaluation (paper, appendix, evaluation protocol): episodes of `steps`
-/// that nothing ends early, fixed conditioning, fixed lights.
+/// Returns the settings of the simulator for evaluation (paper, appendix, evaluation protocol): episodes of exactly
+/// `steps` steps, fixed conditioning, and fixed light cycles.
 SimulatorConfig evaluation_simulator_config(const Config& config, int steps, Device device = {});
 
 }  // namespace pictura

@@ -7,7 +7,7 @@ namespace pictura {
 
 namespace {
 
-// Renderers with identical images by contract have the same name here.
+// Returns a name for the rules by which a renderer draws. Renderers with the same name must draw identical images.
 std::string drawn_by(const std::string& backend) {
   if (backend.starts_with("gl")) return "gl";
   return backend == "null" ? "null" : "exact coverage";
@@ -16,11 +16,12 @@ std::string drawn_by(const std::string& backend) {
 bool may_differ(const NamedKey& key, const Config& saved, const Config& now) {
   if (key.resume != Resume::fixed) return true;
   if (key.name == "render.backend" && drawn_by(saved.render.backend) == drawn_by(now.render.backend)) return true;
-  // The vector policy does not read this section in either configuration, since the modality may not differ.
+  // A vector policy does not use [render]. It is a vector policy in both configurations, because the modality must not
+  // differ.
   return !saved.reads_images() && key.name.starts_with("render.");
 }
 
-// Returns "KEY: OLD became NEW" for each differing key that the predicate accepts.
+// Returns "KEY: OLD became NEW" for each differing key that the predicate `counts` accepts.
 template <typename Predicate>
 std::vector<std::string> differences(const Config& saved, const Config& now, const Predicate& counts,
                                      const char* between = "became") {
@@ -31,7 +32,8 @@ std::vector<std::string> differences(const Config& saved, const Config& now, con
   for (const auto& [key, value] : after.lines) values.emplace(key.name, value);
   std::vector<std::string> result;
   for (const auto& [key, value] : before.lines) {
-    // Some keys are written only if others are not set.
+    // Keys that are written only in one of the configurations are skipped: some keys are only written if others are not
+    // set.
     const auto other = values.find(key.name);
     if (counts(key) && other != values.end() && other->second != value) {
       result.push_back(fmt::format("{}: {} {} {}", key.name, value, between, other->second));

@@ -1,4 +1,4 @@
-// Comparison of two configurations, and whether their differences matter.
+// Compares two configurations, and decides which differences matter.
 #pragma once
 
 #include <map>
@@ -9,24 +9,23 @@
 
 namespace pictura {
 
-/// Returns the key and both values of the first differing setting that changes the meaning of a run, or an empty text.
-/// Differences are allowed in: when to stop and how often to save; the schedule of the learning rate; the optimizer;
-/// the teacher; the average of weights; devices and number of threads, as long as images are drawn by the same rules;
-/// the number of transitions in a forward pass; evaluations; the description of cameras and backbones (compare the rigs
-/// and the programs' hashes); and all of [render] if the policy reads no images.
+/// Returns the key and both values of the first difference that a resumed run must not have, or an empty text. Keys
+/// that visit_keys.h marks with Resume::free or Resume::reported may differ. render.backend may differ if both
+/// renderers draw identical images. All keys of [render] may differ if the policy reads no images. The paths of rigs
+/// and backbones may differ, so compare the rigs and the hashes of the backbones separately.
 std::string first_difference(const Config& saved, const Config& now);
 
-/// Returns the key and both values of the first setting in which two ranks of a run differ, or an empty text. Devices
-/// and number of threads may differ.
+/// Returns the key and both values of the first setting in which two ranks (processes) of a run differ, or an empty
+/// text. Devices and numbers of threads may differ.
 std::string first_difference_of_ranks(const Config& first, const Config& other);
 
-/// Returns the differing settings that a resumed run may change but should report, as "KEY: OLD became NEW": the
-/// schedules of learning rate and image size, the teacher, train.weight_average and train.reproducible. The optimizer
-/// is reported with its moments, see RunKeeper::begin().
+/// Returns the differences that a resumed run may have but should report (Resume::reported), as "KEY: OLD became NEW".
+/// They include the schedules of learning rate and image size, and the teacher. RunKeeper::begin() reports a change of
+/// the optimizer.
 std::vector<std::string> differences_to_report(const Config& saved, const Config& now);
 
-/// Returns the keys that determine an evaluation's counts and that no option of the evaluation replaces, with their
-/// values as written by to_toml(): keys of the worlds, and of the policy if there is one.
+/// Returns the keys, with their values as in to_toml(), that determine the counts of an evaluation and that no option
+/// of the evaluation replaces. They are keys of the worlds, and keys of the policy if has_policy.
 std::map<std::string, std::string> keys_of_evaluation(const Config& config, bool has_policy);
 
 }  // namespace pictura

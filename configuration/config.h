@@ -1,5 +1,6 @@
-// The single configuration of training and evaluation: its keys, defaults (the paper's tables), reading and writing.
-// Each section has a header. docs/reference/configuration.md explains every key; configs/*.toml are examples.
+// Configuration of training and evaluation: its keys, their defaults (from the tables of the paper), reading and
+// writing. Each section has its own header. docs/reference/configuration.md explains every key, and configs/*.toml are
+// examples.
 #pragma once
 
 #include <string>
@@ -30,29 +31,28 @@ struct Config {
   bool reads_images() const { return policy.modality == Modality::perspective; }
 };
 
-/// Reads a TOML text. `overrides` are "section.key=value" and take precedence; "section.key=" removes the text's value,
-/// and "render.rig=..." also removes the text's image sizes. Whole numbers may be written in any decimal notation.
-/// run.backend, the old name of simulator.backend and render.backend, sets each of the two that is absent. Throws Error
-/// naming source:line and key for unknown keys, wrong types, values out of range, contradictions, and backends that
-/// this build does not know, whose names it lists.
+/// Reads a TOML text. `overrides` have the form "section.key=value" and take precedence. "section.key=" removes the
+/// text's value. "render.rig=..." also removes the text's image sizes. Whole numbers may be written in any decimal
+/// notation. run.backend is the old name of simulator.backend and render.backend; it sets those of the two that are
+/// absent. Throws Error, which names source:line and key, for unknown keys, wrong types, values out of range,
+/// contradictions, and unknown backends.
 Config parse_config(const std::string& text, const std::string& source, const std::vector<std::string>& overrides = {});
 
-/// Reads a configuration that a run saved, possibly with another build: it may name any backend.
+/// Reads a configuration that a run saved. It may name any backend, because another build may have saved it.
 Config parse_saved_config(const std::string& text, const std::string& source);
 
-/// Reads a file. Paths of rigs, map files, policy.backbone and train.teacher are relative to their place of definition:
-/// paths in the file to its folder, paths in overrides to the caller's folder. In the result, all are relative to the
-/// caller's folder.
+/// Reads a file. Relative paths in the file (see visit_paths()) start at the file's folder, and relative paths in
+/// overrides start at the caller's folder. In the result, all relative paths start at the caller's folder.
 Config load_config(const std::string& path, const std::vector<std::string>& overrides = {});
 
-/// Returns the configuration with values of [evaluate.conditioning] replaced; each is "name=value". Throws UsageError
-/// that names the option --conditioning.
+/// Returns the configuration with replaced values of [evaluate.conditioning]. Each of `values` is "name=value". Throws
+/// UsageError, which names the option --conditioning, for an invalid value.
 Config with_evaluate_conditioning(const Config& config, const std::vector<std::string>& values);
 
-/// Returns every key with its value, as TOML that parse_config() reads back to an equal Config.
+/// Returns every key with its value as TOML. parse_config() reads an equal Config from it.
 std::string to_toml(const Config& config);
 
-/// Returns names as in a configuration.
+/// Return the names that a configuration uses.
 std::string name_of(Precision precision);
 std::string name_of(OptimizerKind kind);
 

@@ -16,7 +16,7 @@ namespace pictura {
 
 namespace {
 
-// Visitor that describes each key's values and its default, for documents.
+// Visitor that describes the values and the default of each key, for documents.
 class Describer {
  public:
   explicit Describer(const Config& defaults) { visit(defaults, writer_); }
@@ -36,7 +36,7 @@ class Describer {
   void value(const std::string& key, const bool&) { add(key, "true, false"); }
   void value(const std::string& key, const std::string&) { add(key, "a text"); }
   void name(const std::string& key, const std::string&, const std::vector<std::string>& known) {
-    // The known backends depend on the build.
+    // The description does not list backends, because they depend on the build.
     add(key, key.ends_with(".backend") ? "a backend" : fmt::format("{}", fmt::join(known, ", ")));
   }
   void device(const std::string& key, const std::string&) { add(key, kDevices); }

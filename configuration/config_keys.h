@@ -1,4 +1,4 @@
-// Descriptions of a configuration's keys besides their values: for documents, notices and readers in other folders.
+// Descriptions of a configuration's keys for documents, notices about settings, and absolute paths.
 #pragma once
 
 #include <string>
@@ -8,19 +8,19 @@
 
 namespace pictura {
 
-/// Key of the configuration, as documented.
+/// Documentation of a key of the configuration.
 struct ConfigKey {
-  std::string key, default_value, values;  // for instance "train.gamma", "0.999", "0 to 1"
+  std::string key, default_value, values;  // such as "train.gamma", "0.999" and "0 to 1"
 };
 
 /// Returns every key, in the order of to_toml().
 std::vector<ConfigKey> config_keys();
 
-/// Returns a sentence for each setting of a configuration that has no effect without being a contradiction.
+/// Returns a sentence for each setting of a configuration that has no effect but is not an error.
 std::vector<std::string> settings_without_effect(const Config& config);
 
-/// Returns the configuration with absolute paths of its files (rig, maps, teacher, backbone), for readers in any
-/// folder.
+/// Returns the configuration with absolute paths of its files (rig, maps, other policies, teacher, backbone), so that
+/// it can be read in any folder.
 Config with_absolute_paths(Config config);
 
 }  // namespace pictura

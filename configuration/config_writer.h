@@ -14,14 +14,15 @@
 
 namespace pictura {
 
-/// Shortest TOML text that reads back to the same real number: 0.8f is 0.8, not 0.800000011920929.
+/// Returns the shortest TOML text from which the same number is read. For example, 0.8f becomes 0.8, not
+/// 0.800000011920929.
 template <typename Real>
 std::string shortest(Real value) {
   const std::string text = fmt::format("{}", value);
   return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
 }
 
-/// Visitor of keys that writes them.
+/// Visitor of visit() (visit_keys.h) that writes each key.
 class ConfigWriter {
  public:
   template <std::integral Int>
@@ -67,8 +68,8 @@ class ConfigWriter {
     line(key, fmt::format("[{}, {}]", value.low, value.high));
   }
 
-  std::string toml;                                     // complete file
-  std::vector<std::pair<NamedKey, std::string>> lines;  // key, value as written
+  std::string toml;                                     // text of the complete file
+  std::vector<std::pair<NamedKey, std::string>> lines;  // keys, and their values as written
 
  private:
   static std::string quoted(const std::string& value);

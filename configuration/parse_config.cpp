@@ -23,10 +23,10 @@ namespace pictura {
 
 namespace {
 
-/// Visitor of keys that reads them from a file and its overrides.
+/// Visitor that reads each key from a file and its overrides.
 class Reader {
  public:
-  /// Creates a reader. With `any_name`, names of backends are not checked.
+  /// With `any_name`, names of backends are not checked.
   Reader(const toml::table& table, std::string source, const std::set<std::string>& overridden, bool any_name)
       : table_(table), source_(std::move(source)), overridden_(overridden), any_name_(any_name) {}
 
@@ -38,7 +38,7 @@ class Reader {
     }
   }
 
-  /// Reads a key that has no effect if `other` is set; `other` must have been visited before.
+  /// Reads a key that has no effect if the key `other` is set. `other` must have been visited before.
   template <typename Int>
   void value_unless(const std::string& other, bool is_set, const std::string& key, Int& its_value, int64_t low,
                     int64_t high) {
@@ -87,7 +87,7 @@ class Reader {
     }
   }
 
-  /// Reads the old name of two keys, which sets whichever is absent.
+  /// Reads run.backend, the old name of two keys, and sets those of the two that are absent.
   void old_backend(const std::string& key, std::string& simulator, std::string& renderer) {
     const toml::node* node = find(key);
     if (!node) return;
@@ -98,11 +98,11 @@ class Reader {
     std::string its_name;
     name(key, its_name, renderer_names());
     if (!new_renderer) renderer = its_name;
-    // Renderers without a simulator of the same name used the simulator `cpu`.
+    // For renderers without a simulator of the same name, earlier versions used the simulator `cpu`.
     if (!new_simulator) simulator = its_name == "cuda" || its_name == "auto" ? its_name : "cpu";
   }
 
-  /// Reads the old unit of the schedule, in updates of at most agent_steps_per_update each.
+  /// Reads the old key of the schedule, whose unit is updates of at most agent_steps_per_update agent-steps.
   void old_schedule(const std::string& key, int64_t agent_steps_per_update, int64_t& schedule_agent_steps) {
     if (!find(key)) return;
     if (find("train.schedule_agent_steps")) throw_error(key, "has no effect together with train.schedule_agent_steps");
@@ -112,7 +112,7 @@ class Reader {
     schedule_agent_steps = updates > kMost / agent_steps_per_update ? kMost : updates * agent_steps_per_update;
   }
 
-  /// Reads a removed key: only the value that changes nothing is valid.
+  /// Reads a removed key. Only the value of RemovedKey::value is valid.
   void removed(const RemovedKey& key) {
     const toml::node* node = find(key.name);
     if (!node) return;
@@ -122,7 +122,7 @@ class Reader {
     throw_error(key.name, fmt::format("expected {}, got {}: {}", key.value, value.str(), key.reason));
   }
 
-  /// Reads a list that may be empty if its default is empty.
+  /// Reads a list of texts, which may be empty only if its default is empty.
   void texts(const std::string& key, std::vector<std::string>& value) {
     if (const toml::node* node = find(key)) {
       if (value.empty() && node->is_array() && node->as_array()->empty()) return;
@@ -188,11 +188,11 @@ class Reader {
     }
   }
 
-  /// Throws for the first key of the table that no call has read.
+  /// Throws Error for the first key of the table that was not read.
   void reject_unknown_keys(const toml::table& table, const std::string& prefix = "") const {
     for (const auto& [name, node] : table) {
       const std::string key = prefix + std::string(name.str());
-      // An unknown section is reported by its first key.
+      // For an unknown section, the error names the section's first key.
       if (const toml::table* inner = node.as_table(); inner && (sections_.count(key) || !inner->empty()))
         reject_unknown_keys(*inner, key + ".");
       else if (!known_.count(key))
@@ -266,7 +266,8 @@ class Reader {
     return *node.as_array();
   }
 
-  // Suggests the nearest known key, or one that ends alike, for a forgotten or wrong section.
+  // Suggests a known key with the same last part, because the section may be missing or wrong. Else suggests the
+  // nearest known key.
   std::string suggestion_for(const std::string& key) const {
     const std::vector<std::string> known(known_.begin(), known_.end());
     const std::string last = key.substr(key.rfind('.') + 1);
@@ -284,8 +285,8 @@ class Reader {
   std::set<std::string> known_, sections_;
 };
 
-// Parses a value of --set as TOML, with numbers as everywhere in the command. A value that is no TOML is a string, so
-// that run.device=cpu works.
+// Parses a value of --set as TOML. Numbers have the same notation as in other options of the command. A value that is
+// not TOML is a string, so that run.device=cpu works.
 toml::table parse_override(const std::string& value) {
   toml::table parsed;
   const std::optional<int64_t> whole = parse_integer(value);
@@ -306,7 +307,7 @@ toml::table parse_override(const std::string& value) {
   return parsed;
 }
 
-// Applies "train.updates=2" to the table; "train.updates=" removes the key. Returns the key.
+// Applies an override such as "train.updates=2" to the table. "train.updates=" removes the key. Returns the key.
 std::string apply_override(const std::string& text, toml::table* table_inout) {
   const size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0) fail_usage("--set {}: expected section.key=value", text);
@@ -329,7 +330,7 @@ std::string apply_override(const std::string& text, toml::table* table_inout) {
   return key;
 }
 
-// Removes the file's image sizes if an override names a rig, which has its own sizes.
+// Removes the file's image sizes if an override sets a rig, because the rig has its own sizes.
 void drop_sizes_beside_rig(const std::set<std::string>& overridden, toml::table* table_inout) {
   toml::table* const render = table_inout->get_as<toml::table>("render");
   if (!render || !overridden.count("render.rig") || (*render)["rig"].value_or(std::string()).empty()) return;
@@ -362,7 +363,7 @@ void check_patch_changes(const Config& c, const Reader& reader) {
   }
 }
 
-// Throws for settings that worlds of recorded scenes cannot have.
+// Throws Error for settings that recorded scenes do not support.
 void check_scenes(const Config& c, const Reader& reader) {
   for (const std::string& map : c.simulator.maps) {
     const std::optional<std::string> source = scene_source(map);
@@ -511,9 +512,9 @@ Config parse(const std::string& text, const std::string& source, const std::vect
     reader.throw_error("simulator.maps", error.what());
   }
   check_contradictions(config, reader);
-  // A saved configuration has the sizes in force, which differ from those at the start of the schedule.
+  // A saved configuration is not checked, because its sizes may be those after changes of the schedule.
   if (!any_name) check_patch_changes(config, reader);
-  // Earlier versions accepted such values, so saved configurations may contain them.
+  // A saved configuration may contain such values, because earlier versions accepted them.
   if (!any_name && config.simulator.min_agents > config.simulator.num_slots) {
     reader.throw_error("simulator.min_agents", fmt::format("expected at most simulator.num_slots ({}), got {}",
                                                            config.simulator.num_slots, config.simulator.min_agents));

@@ -1,5 +1,5 @@
-// Keys of configurations that earlier versions wrote and that were removed, each with the only value that is still
-// valid: the behaviour without the key.
+// Removed keys, which configurations of earlier versions may contain. Each has only one valid value: the value with
+// which the earlier version behaved like the current version.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 namespace pictura {
 
 struct RemovedKey {
-  const char *name, *value, *reason;  // value in the form common to TOML and JSON
+  const char *name, *value, *reason;  // the valid value, as both TOML and JSON write it
 };
 
 inline constexpr std::array kRemovedKeys{

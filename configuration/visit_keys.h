@@ -1,4 +1,4 @@
-// List of the configuration's keys, which readers, writers, comparisons and descriptions visit.
+// List of the configuration's keys. Reading, writing, comparison and description visit this list.
 #pragma once
 
 #include <array>
@@ -28,8 +28,8 @@ inline constexpr const char* kDevices = "cpu, cuda, cuda:N, auto";
 inline constexpr const char* kSizeChangesExpected =
     "a list of [agent_steps, width_px, height_px] or [agent_steps, width_px, height_px, patch_px, line_floor_px]";
 
-// Visits the keys in the order in which they are written. Reader and writer visit the same list, so every key that is
-// read is also written. A visitor takes (key, value, range...).
+// Visits all keys, in the order in which they are written. Because reader and writer visit the same list, every key
+// that is read is also written. The visitor's members take (key, value, range...).
 template <typename AnyConfig, typename Visitor>
 void visit(AnyConfig& c, Visitor&& v) {
   const double inf = std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-// Files and folders that a configuration names.
+// Visits the paths of files and folders in a configuration.
 #pragma once
 
 #include <optional>
@@ -9,7 +9,8 @@
 
 namespace pictura {
 
-/// Calls visit(key, &path) for every path in the configuration, which then holds what visit() leaves in it.
+/// Calls visit(key, &path) for every path in the configuration: of the rig, the backbone, the teacher, other policies,
+/// map files and scenes. visit() may change the path.
 template <typename Visit>
 void visit_paths(Config* config, Visit&& visit) {
   if (!config->render.rig.empty()) visit("render.rig", &config->render.rig);
