@@ -12,7 +12,8 @@ namespace pictura {
 /// render.line_floor_px follow render.schedule.
 Config config_at(const Config& config, int64_t agent_steps);
 
-/// Returns the whole number that multiplies the width and height of `from` to those of `to`, or 0 if there is none.
+/// Returns the whole number by which both the width and the height of `from` must be multiplied to get `to`, or 0 if
+/// there is no such number.
 int whole_factor(ImageSize from, ImageSize to);
 
 /// Returns the rig (cameras) of the render section after `agent_steps` agent-steps of a run.

@@ -16,8 +16,8 @@ std::string drawn_by(const std::string& backend) {
 bool may_differ(const NamedKey& key, const Config& saved, const Config& now) {
   if (key.resume != Resume::fixed) return true;
   if (key.name == "render.backend" && drawn_by(saved.render.backend) == drawn_by(now.render.backend)) return true;
-  // A vector policy does not use [render]. It is a vector policy in both configurations, because the modality must not
-  // differ.
+  // A vector policy does not use [render]. If `saved` has a vector policy, `now` has one too, because the modality must
+  // not differ.
   return !saved.reads_images() && key.name.starts_with("render.");
 }
 

@@ -29,7 +29,7 @@ struct TrainSection {
   // Learning rate, see training/schedule.h.
   Schedule schedule = Schedule::cosine;
   int64_t schedule_agent_steps = 50'000'000'000;
-  int64_t decay_agent_steps = 0;  // agent-steps at the end of the schedule in which the rate falls; 0: all
+  int64_t decay_agent_steps = 0;  // the rate falls in the last decay_agent_steps of the schedule; 0: in all
   int64_t warm_up_agent_steps = 0;
   int num_steps = 128;            // steps per rollout
   bool stagger_episodes = false;  // ends the first episodes of worlds at different times, see max_steps_of()

@@ -27,7 +27,7 @@ BlindApproaches count_blind_approaches(const RoadMap& map, Span<const WallFace> 
 struct BlindCrossing {
   int32_t approach = -1, other_approach = -1;
 };
-/// Returns each such pair of lanes once, in ascending order of lane indices.
+/// Returns each pair of lanes with hidden traffic once, in ascending order of lane indices.
 std::vector<BlindCrossing> find_blind_crossings(const RoadMap& map, Span<const WallFace> walls,
                                                 float distance_m = 20.0f);
 

@@ -35,7 +35,7 @@ struct LaneComponents {
 /// changes would reach no other lanes, because neighbours begin and end together.
 class LaneGraph {
  public:
-  /// Throws Error unless the cost is finite and not negative. The map must be validated.
+  /// Throws Error if the cost is negative or not finite. The map must be validated.
   explicit LaneGraph(const RoadMap& map, double lane_change_cost_m = 0);
 
   int32_t num_lanes() const { return static_cast<int32_t>(length_m_.size()); }
@@ -61,7 +61,7 @@ class LaneGraph {
     bool is_change = false;
   };
   /// Result of a search from a start position. Node n < num_lanes() is the start of lane n. Node num_lanes() + n is the
-  /// position on lane n beside the start position, which only lane changes reach.
+  /// position on lane n beside the start position. Only lane changes at the start reach such nodes.
   struct Search {
     double begin_fraction = 0;            // start position as a fraction of its lane's length
     std::vector<double> cost_m;           // [nodes] minimum costs

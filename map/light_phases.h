@@ -10,8 +10,8 @@
 namespace pictura {
 
 /// Returns the phase of a junction's approach with this heading. It is the first phase whose axis differs from the
-/// heading, or from the opposite heading, by at most 45 degrees; else a new phase. `axes_inout` holds the axis of each
-/// phase: the heading, in radians, of its first approach.
+/// heading, or from the opposite heading, by at most 45 degrees. If there is none, a new phase is appended.
+/// `axes_inout` holds the axis of each phase: the heading, in radians, of its first approach.
 inline int32_t phase_of_heading(double heading_rad, std::vector<double>* axes_inout) {
   constexpr double kSameAxis_rad = 0.25 * std::numbers::pi;
   const auto same = std::find_if(axes_inout->begin(), axes_inout->end(), [&](double axis) {

@@ -43,7 +43,7 @@ MapText map_text(const std::string& name);
 /// size of a CARLA file with as much road. Throws UsageError if no map has this name.
 int64_t map_file_bytes(const std::string& name);
 
-/// Whether a name names a map file or a copy of a map file, rather than a town or a procedural map.
+/// Whether a name refers to a map file or a copy of a map file, rather than to a town or a procedural map.
 bool is_map_file(std::string_view name);
 
 /// Returns the folder of maps: $PICTURA_DATA if set, else $XDG_DATA_HOME/pictura/maps if XDG_DATA_HOME is set, else

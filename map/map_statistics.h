@@ -22,7 +22,8 @@ struct MapStatistics {
   std::array<double, 3> lane_width_m{}, speed_limit_mps{};
   // Shares of the lanes outside junctions with 1, 2, 3, or at least 4 lanes side by side in their direction.
   std::array<double, 4> lanes_shares{};
-  // Shares of lanes whose radius is at most kMapRadii_m[0], at most [1], at most [2], and larger.
+  // Shares of lanes by the radius of their curves. Class i contains radii up to kMapRadii_m[i]; the last class contains
+  // larger radii.
   std::array<double, 4> radius_shares{};
   // Share of lanes steeper than kSteepGrade; length of parking lanes divided by that of driving lanes outside
   // junctions.

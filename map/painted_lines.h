@@ -25,7 +25,8 @@ struct PaintedLine {
 std::vector<PaintedLine> painted_lines(const RoadMap& map);
 
 /// Maximum width by which a covered road edge extends beyond the painted lines over it. Maps often paint a line along
-/// the border of a road. The chords of the line and of the edge may both deviate from the border, hence the factor.
+/// the border of a road. The factor is 2, because the chords of the line and of the edge may both deviate from the
+/// border.
 constexpr float kCoveredEdgeTolerance_m = 2 * kPaintTolerance_m;
 
 /// Returns the map's road edges except those that painted lines cover. `width_m` is the drawn width of an edge.

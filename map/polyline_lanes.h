@@ -52,10 +52,10 @@ std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
 
 /// Finds junctions. Wanted lanes of different roads that cross each other, except at their ends, become junction lanes.
 /// All junction lanes, including those marked before the call, are assigned to new junctions. Lanes that cross, fork or
-/// merge belong to one junction, which has the name of the first lane's road. bridged_m > 0 is for roads that are cut
-/// into many lanes: then junction lanes that follow each other also belong to one junction, and wanted lanes between
-/// two junction lanes become junction lanes if they are at most bridged_m long. `count_work` receives the number of
-/// steps of loops whose length the file determines.
+/// merge belong to one junction, which has the name of the first lane's road. A positive `bridged_m` is for roads that
+/// are cut into many lanes. Then junction lanes that follow each other also belong to one junction. A wanted lane
+/// between two junction lanes then becomes a junction lane if it is at most bridged_m long. `count_work` receives the
+/// number of steps of loops whose length the file determines.
 void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
                              const std::function<void(std::size_t)>& count_work, RoadMap* map);
 

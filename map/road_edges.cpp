@@ -158,7 +158,7 @@ class Tracer {
   const std::vector<SurfaceBand>& bands_;
   const Surface& surface_;
   int32_t band_ = 0;
-  std::size_t quad_ = 0;             // index in the band of the quad beside the current segment
+  std::size_t quad_ = 0;             // index, within its band, of the quad beside the current segment
   double reach_m_ = kOwnReach_m;     // distance along the band within which quads do not count as a fold
   std::vector<bool> is_narrow_;      // [points of a side]
   Surface::Candidates near_, none_;  // quads near the current point; an empty set, which causes new lookups

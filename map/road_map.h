@@ -113,9 +113,10 @@ struct TrafficLight {
   Vec3 head_m;                 // centre of the head
   Vec2 head_facing;            // unit vector towards the controlled traffic
   int32_t junction = -1;       // -1: on a road away from junctions
-  int32_t phase = 0;           // lights of one phase are green together; ranked by controller, else by heading
-  IndexRange lanes;            // in RoadMap::light_lanes, incoming lanes first, then connecting lanes
-  std::string name;            // the signal's id in the file
+  // Lights of one phase are green together. Phases are in the order of controllers, or of headings without controllers.
+  int32_t phase = 0;
+  IndexRange lanes;  // in RoadMap::light_lanes, incoming lanes first, then connecting lanes
+  std::string name;  // the signal's id in the file
 };
 
 struct Junction {
@@ -125,11 +126,11 @@ struct Junction {
 
 /// A straight piece of the line behind the sidewalk along which walls of buildings may be placed.
 struct BuildingLine {
-  Vec3 a_m, b_m;  // the road lies to the right of a -> b
+  Vec3 a_m, b_m;  // the road is on the right of a -> b
 };
 
-/// Source of an element in the map's file: the road's index in RoadMap::road_names (-1: not on a road), and the line of
-/// the XML element (0: the element is derived, or the map was not read from text).
+/// Source of an element in the map's file. `road` is an index in RoadMap::road_names, or -1 if the element is not on a
+/// road. `line` is the line of the XML element, or 0 if the element is derived or the map was not read from text.
 struct SourceElement {
   int32_t road = -1, line = 0;
 };

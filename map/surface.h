@@ -54,8 +54,8 @@ class Surface {
   }
   static constexpr double kNear_m = 0.1;
 
-  /// Whether the band folds over itself at `p`, as in a turn that is tighter than the band's width: any of its quads
-  /// covers `p` that is more than `reach_m` along the band from its quad `from`.
+  /// Whether the band folds over itself at `p`, as in a turn that is tighter than the band's width. It does if a quad
+  /// of the band covers `p` and is more than `reach_m` along the band from its quad `from`.
   bool is_folded_over(const Candidates& near, const Eigen::Vector2d& p, double z, int32_t band, std::size_t from,
                       double reach_m) const;
 
@@ -87,8 +87,8 @@ class Surface {
 
     void reserve(std::size_t count);
     void push_back(const QuadBounds& bounds);
-    /// Returns a mask with bit k set where the bounds of item first + k contain a place. Bits beyond the last item are
-    /// undefined.
+    /// Returns a mask: bit k is set if the bounds of item first + k contain the position (x, y, z). Bits beyond the
+    /// last item are undefined.
     uint32_t that_contain(std::size_t first, const Float8& x, const Float8& y, const Float8& z) const {
       const auto between = [&](const std::vector<float>& low, const Float8& value, const std::vector<float>& high) {
         return (load8(&low[first]) <= value) & (value <= load8(&high[first]));
@@ -97,7 +97,7 @@ class Surface {
     }
   };
 
-  /// Calls visit(index) for the quads of a cell whose bounds contain a place, until a call returns true; returns
+  /// Calls visit(index) for the quads of a cell whose bounds contain a position, until a call returns true; returns
   /// whether a call did.
   template <typename Visit>
   bool any_in_cell(std::size_t cell, Vec2 p, double z_m, Visit&& visit) const {
@@ -115,7 +115,7 @@ class Surface {
     return false;
   }
 
-  /// Calls visit(quad) for the quads whose bounds contain a place, until a call returns true; returns whether a call
+  /// Calls visit(quad) for the quads whose bounds contain a position, until a call returns true; returns whether a call
   /// did.
   template <typename Visit>
   bool any_quad_at(const Eigen::Vector2d& p, double z, Visit&& visit) const {

@@ -61,8 +61,8 @@ class HttpServer {
   /// header lines. Throws std::system_error if the server cannot listen, for example because another server uses the
   /// port.
   HttpServer(bool everywhere, int port, int num_threads, std::string fields, Handler handler);
-  /// Closes all connections. If a handler waits for anything except its connection, the caller must make it return
-  /// before.
+  /// Closes all connections. If a handler waits for anything except its connection, the caller must make the handler
+  /// return before the destructor runs.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;

@@ -28,7 +28,7 @@ Json pose_json(double x, double y, double z, double heading_rad) {
           {"orientation", {{"x", 0}, {"y", 0}, {"z", std::sin(heading_rad / 2)}, {"w", std::cos(heading_rad / 2)}}}};
 }
 
-// Schemas with the names of Foxglove's schemas, and with those of their members that are written.
+// Schemas with the names of Foxglove's schemas. They contain only the members that are written.
 Json object_schema(Json properties) { return {{"type", "object"}, {"properties", std::move(properties)}}; }
 Json numbers_schema(std::initializer_list<const char*> names) {
   Json properties;

@@ -401,7 +401,7 @@ std::vector<CurvePoint> cut_line(const std::vector<CurvePoint>& line, SampleBudg
       const CurvePoint last = cut.back();
       const double way_m = plan_distance_m(last.position_m, next.position_m);
       if (way_m < kSameOutlinePoint_m) {
-        // The last point is kept exactly, since other lines may begin there.
+        // The last point is kept exactly, because other lines may begin there.
         if (i + 1 == line.size() && cut.size() > 1) cut.back() = next;
         continue;
       }
@@ -446,8 +446,8 @@ void find_lanelets(Build* build) {
       continue;
     }
     Lanelet lanelet{.relation = static_cast<int32_t>(i), .left = {left[0]}, .right = {right[0]}};
-    // As in Lanelet2, a border is reversed if the middle of the other border is not on the expected side: on the right
-    // of the left border, and on the left of the right border.
+    // As in Lanelet2, the left border is reversed if the middle of the right border is not on its right. The right
+    // border is reversed if the middle of the left border is not on its left.
     if (side_of(build->points_of(lanelet.left), middle_of(build->points_of(lanelet.right))) >= 0) {
       lanelet.left.is_reversed = true;
     }

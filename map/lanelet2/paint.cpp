@@ -41,7 +41,7 @@ class Painter {
     if (type == "line_thin") return add_line(index, kThinLine_m, way.tags.of("subtype"));
     if (type == "line_thick") return add_line(index, kThickLine_m, way.tags.of("subtype"));
     if (type == "bike_marking") return add_line(index, kThinLine_m, "dashed");
-    // The borders of a crosswalk get no line here, since the crosswalk's outline is drawn.
+    // The borders of a crosswalk get no line here, because the crosswalk's outline is drawn.
     if (type == "pedestrian_marking" && !crosswalk_borders_.contains(index)) {
       return add_line(index, kThinLine_m, "solid");
     }

@@ -105,8 +105,8 @@ double lane_width(const FileRoad& road, const FileSection& section, const FileLa
 constexpr int inner_border(int lane_id) { return lane_id > 0 ? lane_id - 1 : lane_id + 1; }
 
 /// Returns every s in [begin, end] at which a formula changes, sorted, including begin and end. Formulas change where
-/// pieces of geometry begin, and where cubics begin: of elevation, banking and lane offset, and of the widths and
-/// heights of the lanes up to `border`.
+/// pieces of geometry begin, and where cubics of elevation, banking or lane offset begin. They also change where cubics
+/// of widths and heights begin, of the lanes up to `border`.
 std::vector<double> formula_changes(const FileRoad& road, const FileSection& section, int border, double begin,
                                     double end);
 

@@ -13,8 +13,7 @@ namespace pictura::opendrive {
 
 namespace {
 
-// Maximum distance between reference lines at linked ends for which the shifts of the ends differ. Ends that are
-// farther apart get equal shifts.
+// Linked ends whose reference lines are farther apart than this distance get equal shifts.
 constexpr double kMaxLinkOffset_m = 40.0;
 
 /// Ends of roads, numbered 2 * road + (0: start, 1: end), in groups of linked ends.

@@ -68,8 +68,8 @@ class Element {
   /// Reads a number. Repair: a missing attribute counts as 0.
   double number_or_zero(const char* attribute) const;
   double number_or_zero_in(const char* attribute, double low, double high) const;
-  /// Reads a size in [0, high]. A missing size returns 0, for which the caller uses its default. Repair: a negative
-  /// size counts as missing, because some writers set -1.
+  /// Reads a size in [0, high]. Returns 0 for a missing size; the caller then uses its default. Repair: a negative size
+  /// counts as missing, because some writers set -1.
   double size(const char* attribute, double high) const;
   int integer(const char* attribute) const;
   /// Reads a flag. A missing flag is false. Repair: a value other than true, false, 1 and 0 counts as false.

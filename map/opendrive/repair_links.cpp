@@ -139,9 +139,9 @@ class LinkRepairer {
     if (!touches) clear_link(link);
   }
 
-  /// Finds the ends where the two roads of a connection meet: from the connecting road's link, else from the incoming
-  /// road's link to the junction, else from geometry. If the roads do not meet, records the repair (the caller omits
-  /// the connection) and returns false.
+  /// Finds the ends where the two roads of a connection meet. The connecting road's link determines them if it exists,
+  /// else the incoming road's link to the junction, else geometry. If the roads do not meet, records the repair (the
+  /// caller omits the connection) and returns false.
   bool find_ends(const FileJunction& junction, Connection* connection) {
     const FileRoad* const incoming = road_named(connection->incoming_road);
     const FileRoad* const connecting = road_named(connection->connecting_road);

@@ -160,8 +160,9 @@ class SignalBuilder {
     return map_.lane_points[static_cast<std::size_t>(lane(index).points.end) - 1];
   }
 
-  /// Adds the lanes to which a signal applies at its s on a road: the lanes of its validity if it has one, else all
-  /// lanes of its orientation. For a light away from junctions, the lanes that meet at its stop line form an approach.
+  /// Adds the lanes of a road to which a signal (or a reference to it) applies: the lanes of its validity if it has
+  /// one, else all lanes of its orientation. For a light away from junctions, the lanes that meet at its stop line form
+  /// an approach.
   template <typename Signal>
   void collect(std::size_t signal_index, std::size_t road, const Signal& signal) {
     const FileRoad& file_road = build_.network.roads[road];

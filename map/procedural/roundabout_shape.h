@@ -11,8 +11,8 @@ namespace pictura::town {
 inline constexpr double kCircleLaneWidth_m = 4.5;
 constexpr double circle_radius_m(int lanes) { return lanes == 1 ? 12 : 18; }
 
-/// Radius of the border of the circle's lanes where the left borders of entries end and those of exits begin. An arm
-/// with fewer lanes than the circle uses the circle's outermost lanes.
+/// Radius at which the left borders of entries meet the circle, and the left borders of exits leave it. An arm with
+/// fewer lanes than the circle uses the circle's outermost lanes.
 constexpr double circle_edge_m(int lanes, int arm_lanes) {
   return circle_radius_m(lanes) + (lanes - arm_lanes) * kCircleLaneWidth_m;
 }

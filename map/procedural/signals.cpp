@@ -10,7 +10,8 @@ namespace pictura::town {
 namespace {
 
 constexpr double kPostSetback_m = 0.8;  // distance of a post from the kerb
-// Near-side heads are on a post beyond the stop line, or on a mast arm over the lanes that is high enough for traffic.
+// Near-side heads are on a post beyond the stop line, or on a mast arm over the lanes. The mast arm is high enough for
+// traffic to pass below.
 constexpr double kNearPost_m = 3, kNearArm_m = 4, kArmRise_m = 2;
 
 struct SignalPosition {

@@ -1,4 +1,4 @@
-// Drivable area of a map according to its road edges: a position is on the road if it is on the drivable side of the
+// Drivable area of a map according to its road edges: a position is on the road if it is on the road's side of the
 // nearest edge. Recorded maps need this rule, because their lanes do not determine the extent of the road.
 #pragma once
 

@@ -14,9 +14,9 @@ namespace pictura::womd {
 
 enum class WireType : uint8_t { varint = 0, fixed64 = 1, bytes = 2, fixed32 = 5 };
 
-/// Reads the fields of a message in sequence. All members throw FieldError if the bytes are not a message: if a length
-/// or a number extends beyond the end, a varint has more than ten bytes or 64 bits, a wire type is that of a group (3,
-/// 4) or undefined (6, 7), or a field number is 0.
+/// Reads the fields of a message in sequence. All members throw FieldError if the bytes are not a message. Faults are:
+/// a length or a number beyond the end, a varint of more than ten bytes or 64 bits, a wire type of groups (3, 4), an
+/// undefined wire type (6, 7), and field number 0.
 class WireReader {
  public:
   explicit WireReader(std::string_view message) : rest_(message) {}

@@ -16,9 +16,9 @@ namespace pictura::womd {
 
 /// Parses a record's payload. `source` is the record's name in messages ("FILE: record 3"); the scenario's id is added
 /// to it. Accepts fields in any order, and packed and unpacked repeated numbers. Throws Error "SOURCE (scenario ID):
-/// FIELD: ..." in these cases: the bytes are not a `Scenario` message; a point of the map or a valid state has a number
-/// that is not finite; the number of states or signals differs from that of timestamps; there are more than 4 million
-/// points and states in total.
+/// FIELD: ..." if the bytes are not a `Scenario` message, or if a point of the map or a valid state has a number that
+/// is not finite. Also throws Error if the number of states or signals differs from the number of timestamps, or if
+/// there are more than 4 million points and states in total.
 LoggedScene parse_scenario(std::string_view payload, const std::string& source);
 
 /// Returns the scenario_id of a record, or an empty string if it has none. Reads only a small part of the record.
