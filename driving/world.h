@@ -29,7 +29,7 @@ struct WorldOptions : SessionOptions {
   std::optional<int> parked_cars;
   OtherShares others{};
   // Options for recorded scenes: the tracks that the policy drives, the step of the recording at which episodes begin,
-  // and whether traffic lights follow the recording. An episode lasts for the rest of the recording, but at least
+  // and whether the recorded traffic lights are used. An episode lasts for the rest of the recording, but at least
   // min_episode_steps steps.
   std::string controlled = "self";
   int start_step = 0;

@@ -61,7 +61,7 @@ class LaneGraph {
     bool is_change = false;
   };
   /// Result of a search from a start position. Node n < num_lanes() is the start of lane n. Node num_lanes() + n is the
-  /// position on lane n beside the start position. Only lane changes at the start reach such nodes.
+  /// position on lane n beside the start position. Only lane changes at the start lead to such nodes.
   struct Search {
     double begin_fraction = 0;            // start position as a fraction of its lane's length
     std::vector<double> cost_m;           // [nodes] minimum costs

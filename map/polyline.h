@@ -111,7 +111,8 @@ std::vector<CurvePoint> sample_curve(const CurveBreaks& curve, double tolerance_
     budget->count_sample();
     if (depth < kMaxDepth) {
       bool is_fine = is_within(a.position_m, b.position_m, max_piece_m + kPieceRounding);
-      // A chord over h deviates by at most h^2 / 8 times the second derivative, so most chords need no test.
+      // A chord over an interval h of s deviates by at most h^2 / 8 times the second derivative, so most chords need no
+      // test.
       const double h = b.s - a.s;
       if (is_fine && a.s > low && b.s < high && bend * h * h <= 8 * kSafety * kDenseShare * tolerance_m) {
         dense.push_back(b);

@@ -113,7 +113,8 @@ struct TrafficLight {
   Vec3 head_m;                 // centre of the head
   Vec2 head_facing;            // unit vector towards the controlled traffic
   int32_t junction = -1;       // -1: on a road away from junctions
-  // Lights of one phase are green together. Phases are in the order of controllers, or of headings without controllers.
+  // Number of the phase in the junction. Lights of one phase are green together. Phases are in the order of the
+  // junction's controllers. Without controllers, headings determine the phases.
   int32_t phase = 0;
   IndexRange lanes;  // in RoadMap::light_lanes, incoming lanes first, then connecting lanes
   std::string name;  // the signal's id in the file

@@ -26,7 +26,8 @@ class Surface {
  public:
   Surface(const std::vector<SurfaceBand>& bands, double level_m);
 
-  /// Quads that may cover points within kNear_m of the position of find_near(), with all that do.
+  /// Quads near the position of find_near(). They include all quads that cover any point within kNear_m of this
+  /// position.
   struct Candidates {
     std::vector<int32_t> quads;
     bool are_complete = false;  // false if the circle around the position is in several cells
@@ -82,7 +83,7 @@ class Surface {
   /// Bounds of the grid's items, in the order of the items, with one array per side. Queries test the bounds of eight
   /// quads at a time, and so exclude most quads of a cell.
   struct ItemBounds {
-    static constexpr std::size_t kPadding = 7;  // because eight bounds are read from any item on
+    static constexpr std::size_t kPadding = 7;  // bounds are read eight at a time, also from the last item
     std::vector<float> low_x, high_x, low_y, high_y, low_z, high_z;
 
     void reserve(std::size_t count);

@@ -108,7 +108,8 @@ enum class ShapeKind : uint8_t {
   stop_line,      // line
   road_edge,      // line
   wall,           // line
-  // Points: both ends of the stop line, the head, and a point one metre in front of the head. In the order of the map.
+  // Points: both ends of the stop line, the head, and a point one metre in front of the head. Lights are in the order
+  // of the map.
   light,
 };
 constexpr int kNumShapeKinds = 8;

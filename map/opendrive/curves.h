@@ -23,8 +23,8 @@ void measure(PlaneCubic* cubic);
 void measure(GeometryPiece* piece);
 
 /// Returns the pose at distance `ds` from the start of a piece. It is exact for lines and arcs. Spirals use
-/// Gauss-Legendre quadrature, and must be measured before. Plane cubics are parametrised by arc length, which is scaled
-/// so that the cubic ends at the end of the piece.
+/// Gauss-Legendre quadrature; measure() must be called for them before. Plane cubics are parametrised by arc length,
+/// which is scaled so that the cubic ends at the end of the piece.
 Pose pose_on(const GeometryPiece& piece, double ds);
 
 /// Returns the pose of the reference line at s, which is clamped to the road.

@@ -10,8 +10,8 @@
 
 namespace pictura::opendrive {
 
-/// Parses `text`. Throws Error, which names source and line, if the text is not well-formed UTF-8 XML. Also throws it
-/// for a document type, an <include>, nesting of more than 64 elements, and an attribute of more than 4 KiB.
+/// Parses `text`. Throws Error, which names source and line, if the text is not well-formed UTF-8 XML. Also throws
+/// Error for a document type, an <include>, nesting of more than 64 elements, and an attribute of more than 4 KiB.
 void read_document(std::string_view text, const Source& source, pugi::xml_document* document_out);
 
 }  // namespace pictura::opendrive

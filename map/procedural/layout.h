@@ -59,7 +59,7 @@ struct Street {
   int from = 0, to = 0;
   int direction = 0, end_direction = 0;  // directions of the arms at `from` and at `to`
   StreetKind kind = StreetKind::street;
-  int lanes = 1;  // each way
+  int lanes = 1;  // in each direction
   double lane_width_m = 0;
   bool is_present = true, has_sidewalks = true;
   bool parks_left = false, parks_right = false;

@@ -23,7 +23,7 @@ struct SceneCacheKey {
   int64_t record = 0;
 };
 
-/// Kind of a file, with the beginning of its header.
+/// Kind of a file. The header of the file contains magic bytes, version and layout.
 struct FieldFileKind {
   std::array<char, 8> magic{};
   uint32_t version = 1;    // version of the header
