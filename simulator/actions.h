@@ -1,4 +1,5 @@
-// The joint discrete action space (paper, policy architecture): 4 longitudinal by 3 lateral jerks.
+// The discrete action space (paper, policy architecture): an action is one of 4 longitudinal jerks combined with one of
+// 3 lateral jerks.
 #pragma once
 
 #include "pictura/common/portable/hd.h"

@@ -1,4 +1,4 @@
-// Owner of the agents' fields on the host.
+// Storage of all agents' fields (see fields.h) in host memory.
 #pragma once
 
 #include <vector>
@@ -18,13 +18,13 @@ struct AgentState {
   void resize(size_t num_agents);
   void reserve(size_t num_agents);
   AgentStateView view();
-  /// Adds the bytes of every field, in the order of the list; fields of lives are included if `with_lives`, here and
-  /// below.
+  /// Hashes the bytes of every field, in the order of fields.h. In this and the following functions, `with_lives`
+  /// includes the fields of lives.
   void add_to(Hash64* hash_inout, bool with_lives) const;
   size_t size_bytes(bool with_lives) const;
-  /// Writes the bytes of every field, in the order of the list: size_bytes() bytes.
+  /// Writes the bytes of every field, in the order of fields.h: size_bytes() bytes.
   void copy_to(uint8_t* bytes_out, bool with_lives) const;
-  /// Reads the bytes that copy_to() wrote for as many agents; `bytes` holds at least size_bytes() bytes.
+  /// Reads bytes that copy_to() wrote for the same number of agents; `bytes` must hold at least size_bytes() bytes.
   void assign_from(const uint8_t* bytes, bool with_lives);
 };
 

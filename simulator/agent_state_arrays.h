@@ -24,7 +24,7 @@ constexpr AgentFieldInfo kAgentFields[] = {
 #undef X
 };
 
-/// Whether a field is computed from other fields, so that Simulator::set_state refuses it.
+/// Whether the simulator computes a field from other fields. Simulator::set_state refuses such a field.
 constexpr bool is_derived(AgentField field) {
   switch (field) {
     case AgentField::cos_heading:
@@ -41,13 +41,15 @@ constexpr bool is_derived(AgentField field) {
   }
 }
 
-/// Returns all fields, [slots] or [slots, per agent].
+/// Returns all fields as arrays of shape [slots] or, for fields with several values per agent, [slots, per agent].
 std::vector<NamedArray> agent_state_arrays(const AgentStateView& state, int num_slots, Device device);
 
-/// Returns the edit that these arrays describe, with unchecked values. Throws Error as Simulator::set_state does.
+/// Returns the edit that these arrays describe. Checks the arrays, but not their values: throws Error as
+/// Simulator::set_state does.
 StateEdit state_edit(const Array& slots, Span<const NamedArray> fields, int num_slots, Device device);
 
-/// Formats a field's values in one slot, in host memory: "3", or "[1, 2, 3]".
+/// Formats the values of a field in one slot: "3", or "[1, 2, 3]" for several values. The fields must be in host
+/// memory.
 std::string field_text(const AgentStateView& agents, int slot, AgentField field);
 
 }  // namespace pictura

@@ -1,4 +1,5 @@
-// A road map in all forms that simulators and renderers read, compiled once and shared by them.
+// A road map in all forms that simulators and renderers read. A map is compiled once; simulators and renderers share
+// the result.
 #pragma once
 
 #include <memory>
@@ -19,11 +20,11 @@ struct MapOptions {
   bool walls = true;  // along the building lines
   uint64_t wall_seed = 0;
   LightHeads light_heads = LightHeads::as_mapped;
-  bool observe_walls = false;    // build rules.near_wall_pieces
+  bool observe_walls = false;    // make walls observable: build rules.near_wall_pieces
   bool recorded_lights = false;  // include the lights of a recorded scene, see compile_scenario()
-  // Maximum length of observed pieces of lanes and boundaries. 0: at most 10 m, following curves within 0.25 m, as in
-  // training. Above 0: parts that are straight within 2 cm, of any length, are cut evenly into pieces of at most this
-  // length (paper, evaluation protocol: on logged maps long segments are subdivided at observation time).
+  // Maximum length of observed pieces of lanes and boundaries. 0: as in training, pieces are at most 10 m long and
+  // deviate at most 0.25 m from curves. Above 0: each part that is straight within 2 cm is cut evenly into pieces of at
+  // most this length (paper, evaluation protocol: long segments of logged maps are subdivided at observation time).
   float observed_span_m = 0;
   bool operator==(const MapOptions&) const = default;
 };
@@ -31,17 +32,18 @@ struct MapOptions {
 struct CompiledMap {
   std::shared_ptr<const RoadMap> road;
   std::shared_ptr<const Scenario> scenario;  // the recorded scene of this map, or null
-  int32_t start_step = 0;                    // step of the recording at which episodes start
+  int32_t start_step = 0;                    // time step of the recorded scene at which episodes start
   MapOptions options;
   MapRules rules;            // data that the simulator's rules read
   StaticGeometry geometry;   // data that renderers draw
   uint64_t fingerprint = 0;  // hash of all road-map data that the simulator reads
 };
 
-/// Compiles a map. Throws Error naming the map when agents cannot drive on it or have no place to spawn, and UsageError
-/// for a null pointer.
+/// Compiles a map. Throws Error, which names the map, if agents cannot drive on it or have no place to spawn. Throws
+/// UsageError for a null pointer.
 std::shared_ptr<const CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, const MapOptions& options = {});
-/// Compiles a map with its record, so that agents need no place to spawn; see compile_scenario().
+/// Compiles a map with recorded tracks. Agents then start where their records start, so the map needs no places to
+/// spawn; see compile_scenario().
 std::shared_ptr<CompiledMap> compile_map(std::shared_ptr<const RoadMap> road, const MapOptions& options,
                                          MapRecord record);
 

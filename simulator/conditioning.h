@@ -1,5 +1,5 @@
-// The seventeen coefficients that condition each agent's reward and dynamics: their order, their training distribution
-// (paper, table of the conditioning coefficients) and the scale to [-1, 1] for the policy.
+// The 17 coefficients that weight each agent's reward and scale its dynamics: their order, their names and their
+// training distributions (paper, table of the conditioning coefficients).
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -20,10 +20,10 @@ enum class Conditioning : int32_t {
   velocity,
   reverse,
   overspeed,
-  timestep,  // reward
+  timestep,  // these 14: reward
   throttle,
   steer,
-  acceleration,  // dynamics
+  acceleration,  // the last 3: dynamics
 };
 constexpr int kNumConditioning = 17;
 constexpr int kNumRewardConditioning = 14;

@@ -1,4 +1,4 @@
-// Main loop of driving a simulator: check for ^C, commands, a step.
+// Main loop that drives a simulator: in each pass it checks for ^C, gets commands and takes a step.
 #pragma once
 
 #include <functional>
@@ -15,12 +15,12 @@ struct DriveEnd {
   bool is_interrupted = false;
 };
 
-/// Takes at most `steps` steps by the commands [slots] that act(step) writes, through step_observed(), and calls
-/// on_step(step, result) after each. Ends before the first step that ^C precedes, or for which act() returns false.
+/// Takes at most `steps` steps. Before each step, act(step) writes `commands` [slots]; step_observed() takes the step;
+/// then on_step(step, result) is called. Ends early on ^C, or if act() returns false.
 DriveEnd drive_steps(Simulator& simulator, Span<Command> commands, int steps, const std::function<bool(int)>& act,
                      const std::vector<StepObserver*>& observers = {},
                      const std::function<void(int, const StepResult&)>& on_step = {});
-/// Takes steps by the commands of a controller, which acts for all agents of a simulator in host memory.
+/// Variant in which a controller writes the commands of all agents. The simulator must work in host memory.
 DriveEnd drive_steps(Simulator& simulator, Controller& controller, int steps,
                      const std::vector<StepObserver*>& observers = {},
                      const std::function<void(int, const StepResult&)>& on_step = {});

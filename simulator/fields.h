@@ -1,6 +1,6 @@
-// State of all agents as structure of arrays, declared once: name, type, initial value and description. Allocation,
-// reset, hashing, comparison, checkpoints and bindings all use this list, in this order. simulator/agent_state.h owns
-// the fields on the host.
+// List of all fields of an agent's state: name, type, initial value and description. Each field is one array over all
+// agents (structure of arrays). Allocation, reset, hashing, comparison, checkpoints and bindings use this list, in this
+// order. AgentState (simulator/agent_state.h) stores the fields in host memory.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -8,9 +8,9 @@
 
 namespace pictura {
 
-/// Status of a controlled agent in its episode. Halted agents remain as obstacles. Recorded agents follow the record of
-/// their world's scene: other agents see them and can collide with them, but they have no events until an action makes
-/// them active. Waiting agents have left a road that ends, and have no place until they enter a road again.
+/// Status of a controlled agent in its episode. Halted agents remain as obstacles. Recorded agents follow their
+/// records: other agents see them and can collide with them, but they have no events until an action makes them active.
+/// Waiting agents have left the map on a road that ends; they have no box until they enter a road again.
 enum class AgentStatus : uint8_t { active, halted, parked, absent, recorded, waiting };
 
 /// Whether an agent with this status has a box in its world.
@@ -26,18 +26,18 @@ PICTURA_HD constexpr bool takes_actions(AgentStatus status) {
 /// Consequence of an infraction for its agent: it halts, leaves the episode, or drives on with the infraction counted.
 enum class AfterInfraction : uint8_t { halt, leave, drive_on };
 
-/// Reason why an agent found no place at the start of its episode.
+/// Reason why an agent got no place at the start of its episode.
 enum class SpawnFailure : uint8_t {
   none,
   no_place,  // the map has no place for its class
   taken,     // all tried places were occupied, or too near to another box
 };
 
-/// Reason why an agent halted; also the events of a step, as bits.
+/// Bits of the events of an agent in a step. The events that halted an agent are also stored as its halt_reason.
 enum Event : uint8_t {
   kEventNone = 0,
   kEventCollision = 1,
-  kEventAtFault = 2,  // with kEventCollision
+  kEventAtFault = 2,  // always together with kEventCollision
   kEventOffRoad = 4,
   kEventRedLight = 8,
   kEventWall = 16,
@@ -50,7 +50,7 @@ constexpr int kInfractions = kEventCollision | kEventOffRoad | kEventRedLight | 
 
 constexpr int kNumWaypoints = 3;
 
-// X(name, type, per agent, first value, comment)
+// Each row is X(name, type, values per agent, initial value, comment).
 #define PICTURA_EPISODE_FIELDS(X)                                                                                \
   X(x_m, float, 1, 0, "rear axle, or the centre of a pedestrian")                                                \
   X(y_m, float, 1, 0, "")                                                                                        \
@@ -95,8 +95,9 @@ constexpr int kNumWaypoints = 3;
   X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                          \
   X(episode_return, float, 1, 0, "sum of rewards in this episode")
 
-// Fields of lives, which follow each other in a slot on roads that end. On other maps the fields keep their initial
-// values, and saved states and hashes omit them.
+// Fields of lives. A life lasts from an agent's start or entry until it leaves the map; on maps with roads that end,
+// several lives follow each other in a slot. On other maps these fields keep their initial values, and saved states and
+// hashes omit them.
 #define PICTURA_LIFE_FIELDS(X)                                                                     \
   X(life, int32_t, 1, 0, "lives of this episode that ended before by leaving")                     \
   X(life_step, int32_t, 1, 0, "steps of this episode before the life began; counts are of a life") \
@@ -104,15 +105,15 @@ constexpr int kNumWaypoints = 3;
 
 #define PICTURA_AGENT_FIELDS(X) PICTURA_EPISODE_FIELDS(X) PICTURA_LIFE_FIELDS(X)
 
-/// Pointers to all fields, on either device, for the rules.
+/// Pointers to the arrays of all fields, in host or device memory, for the rules.
 struct AgentStateView {
 #define X(name, type, per_agent, first, comment) type* name;
   PICTURA_AGENT_FIELDS(X)
 #undef X
 };
 
-/// Copies every field of one agent. All fields are read before the first is written, so that a device need not wait for
-/// each.
+/// Copies every field of one agent. It reads all fields before it writes the first, so that a GPU can overlap the
+/// reads.
 PICTURA_HD inline void copy_fields(const AgentStateView& from, int from_slot, const AgentStateView& to, int to_slot){
 #define X(name, type, per_agent, first, comment) \
   type name[per_agent];                          \

@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// Hashes values that have no padding.
+/// Adds the bytes of values to a hash. Their types must have no padding.
 template <typename... Values>
 void add_values(Hash64* hash_inout, const Values&... values) {
   (hash_inout->add_bytes(&values, sizeof(values)), ...);

@@ -1,5 +1,4 @@
-// Worlds of an executor on the host: setup and state as WorldViews, which the rules run over, and further results for
-// the executor's users.
+// Worlds and results of a simulator on the host. The rules of the simulation run on a WorldView of each world.
 #pragma once
 
 #include <vector>
@@ -13,7 +12,8 @@ struct HostWorlds {
   explicit HostWorlds(SimulatorSetup its_setup);
   HostWorlds(const HostWorlds&) = delete;
   HostWorlds& operator=(const HostWorlds&) = delete;
-  /// Replaces the worlds by others, at their initial values. Arrays move only where the capacity is too small.
+  /// Replaces the worlds by those of another setup, in their initial state. Moves an array only if its capacity is too
+  /// small.
   void assign(const SimulatorSetup& other);
   void reserve(const SimulatorCapacity& capacity);
 
@@ -21,7 +21,7 @@ struct HostWorlds {
 
   SimulatorSetup setup;
   SimulatorState state;
-  // Rebuilt by every step: the boxes by the cells of their centres.
+  // Grid of each world: a cell lists the boxes whose centres are in the cell. Every step rebuilds the lists.
   std::vector<CellLists> box_cells;  // [worlds]
   std::vector<Vec2> cell_centers;    // centres of the boxes, in the order of each world's box_cells
   SceneBatch scene;
@@ -30,7 +30,7 @@ struct HostWorlds {
   void make_cells_and_scene();
 };
 
-/// Results of an executor on the host for its users, besides the state.
+/// Outputs of a simulator on the host besides the state: rewards, ends of episodes, observations and views.
 struct HostResults {
   HostResults() = default;
   HostResults(size_t num_slots, const SimulatorConfig& config) { resize(num_slots, config); }
@@ -45,7 +45,7 @@ struct HostResults {
             .sums = sums.data()};
   }
 
-  std::vector<float> reward;  // [slots], as are the following vectors
+  std::vector<float> reward;  // [slots], like all vectors below
   std::vector<uint8_t> terminated, truncated, valid, driver;
   std::vector<StepSums> sums;
   std::vector<View> views;

@@ -1,5 +1,5 @@
-// A RoadMap flattened into the data that the rules read: pieces, links and cell lists. Made once per map, shared by all
-// worlds on the map.
+// A RoadMap flattened into the data that the rules of the simulation read: straight pieces, links and cell lists. It is
+// made once per map; all worlds on the map share it.
 #pragma once
 
 #include <memory>
@@ -14,7 +14,7 @@
 
 namespace pictura {
 
-/// Lists of items per cell, in a chosen order.
+/// Grid over the map with a list of items for each cell. The builder of the lists chooses the order of the items.
 struct CellLists {
   Vec2 origin_m;
   float cell_m = 1;
@@ -25,7 +25,7 @@ struct CellLists {
   GridView view() const { return {origin_m, cell_m, num_x, num_y, begin, items}; }
 };
 
-/// Recorded data of a map; empty for most maps.
+/// Recorded tracks and lights of a map that was compiled from a recorded scene; empty for other maps.
 struct MapRecord {
   std::vector<RecordedAgent> agents;
   std::vector<RecordedState> states;     // [agents, steps]
@@ -46,7 +46,7 @@ struct MapRules {
   std::vector<MapLane> lanes;  // all lanes of the RoadMap, in its order; lanes that are not drivable have no segments
   std::vector<int32_t> successors;
   std::vector<Barrier> edges, walls;
-  std::vector<StopLine> stop_lines;  // lines of RoadMap::lights, in its order
+  std::vector<StopLine> stop_lines;  // one for each of RoadMap::lights, in its order
   std::vector<int32_t> spawn_lanes;
   std::vector<float> spawn_end_m;
   std::vector<Exit> exits;
@@ -64,13 +64,13 @@ struct MapRules {
   bool is_open = false;
 
   MapView view() const;
-  /// Size of all arrays of the view in one piece of memory, each aligned to kMapAlignment_bytes.
+  /// Size of one piece of memory that holds all arrays of the view, each aligned to kMapAlignment_bytes.
   int64_t size_bytes() const;
 };
 constexpr size_t kMapAlignment_bytes = 256;
 
-/// Makes the rules of a map; walls are observable if `observe_walls`, and observed_span_m is that of MapOptions. Throws
-/// Error naming the map when it has no drivable lane.
+/// Makes the rules of a map. Agents can observe walls if `observe_walls`. For observed_span_m see MapOptions. Throws
+/// Error, which names the map, if it has no drivable lane.
 MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls = false,
                         MapRecord record = {}, float observed_span_m = 0);
 

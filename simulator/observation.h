@@ -8,8 +8,8 @@
 
 namespace pictura {
 
-constexpr int kEgoFeatures = 9;                         // 7 and two auxiliary slots
-constexpr int kMaxPartners = 16, kPartnerFeatures = 8;  // 7 and one auxiliary slot
+constexpr int kEgoFeatures = 9;                         // 7 and 2 auxiliary features
+constexpr int kMaxPartners = 16, kPartnerFeatures = 8;  // 7 and 1 auxiliary feature
 constexpr int kMaxLanes = 80, kLaneFeatures = 7;
 constexpr int kMaxBoundaries = 80, kBoundaryFeatures = 7;
 constexpr int kMaxControls = 10, kControlFeatures = 7;
@@ -20,13 +20,12 @@ constexpr int kWaypointFeatures = 3;
 enum class EntitySet : int32_t { partners, lanes, boundaries, controls, walls };
 constexpr int kNumEntitySets = 5;
 
-/// Condition for an array's presence: own arrays are always present, sets with SimulatorConfig::vector_observations,
-/// and walls if requested in addition.
+/// Condition for the presence of an array: `own` arrays are always present, `sets` with
+/// SimulatorConfig::vector_observations, and `walls` if SimulatorConfig::wall_observations is set too.
 enum class ObservationPart : uint8_t { own, sets, walls };
 
-// X(name, type, rows, features, part, comment): the arrays of an observation, [slots, rows, features]. All code that
-// knows the arrays uses this list: their layout here and in executors, observation_arrays(), and the schemas and
-// encoders of readers.
+// X(name, type, rows, features, part, comment): the arrays of an observation, [slots, rows, features]. This list is the
+// only one: simulators, observation_arrays(), bindings and policies all use it.
 #define PICTURA_OBSERVATION_ARRAYS(X)                                                                            \
   X(ego, float, 1, kEgoFeatures, ObservationPart::own, "")                                                       \
   X(partners, float, kMaxPartners, kPartnerFeatures, ObservationPart::sets, "")                                  \
@@ -38,8 +37,8 @@ enum class ObservationPart : uint8_t { own, sets, walls };
   X(conditioning, float, 1, kNumConditioning, ObservationPart::own, "scaled; see docs/reference/observation.md") \
   X(waypoints, float, kNumWaypoints, kWaypointFeatures, ObservationPart::own, "ego frame")
 
-/// Observations of all slots. Entity sets are padded with zeros beyond their counts, and empty if they are not
-/// computed.
+/// Observations of all slots. Rows of an entity set beyond its count are zeros. Arrays that the simulator does not
+/// compute are empty.
 struct ObservationView {
 #define X(name, type, rows, features, part, comment) Span<type> name;
   PICTURA_OBSERVATION_ARRAYS(X)

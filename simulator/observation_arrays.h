@@ -1,4 +1,4 @@
-// Arrays of an observation by name, type and shape, generated from the list in observation.h.
+// Names, types and shapes of an observation's arrays, generated from the list in observation.h.
 #pragma once
 
 #include <string_view>
@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// One array of every slot's observation.
+/// Name, type and shape of one array of an observation.
 struct ObservationArray {
   std::string_view name;
   ElementType type;
@@ -24,7 +24,7 @@ constexpr ObservationArray kObservationArrays[] = {
 #undef X
 };
 
-/// Returns the arrays that are present, [slots, rows, features], in the order of the list.
+/// Returns the arrays that are present (not empty), each [slots, rows, features], in the order of the list.
 std::vector<NamedArray> observation_arrays(const ObservationView& observations, int num_slots, Device device);
 
 }  // namespace pictura

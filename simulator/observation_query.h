@@ -1,4 +1,4 @@
-// Hypothetical observations: the input of Simulator::observe. Plain structs that both devices read.
+// Input of Simulator::observe(), which computes hypothetical observations. Plain structs for host and device code.
 #pragma once
 
 #include "pictura/common/scene_types.h"
@@ -6,23 +6,24 @@
 
 namespace pictura {
 
-/// Query for the observation of a slot without some boxes and with some additional boxes.
+/// Question: what would a slot observe if some boxes were hidden and some boxes were inserted?
 struct ObservationQuery {
   int32_t slot = 0;
   int32_t hidden_begin = 0, hidden_end = 0;      // hidden boxes: a range of a list of indices into scene().agents
   int32_t inserted_begin = 0, inserted_end = 0;  // inserted boxes: a range of a list of InsertedBoxes
-  /// 0: partners are chosen as in a world without the hidden boxes, so that farther boxes take their rows. 1: partners
-  /// are chosen with the hidden boxes, whose rows are zeros.
+  /// 0: hidden boxes are ignored, so that farther boxes take their rows among the partners (the observed road users).
+  /// 1: hidden boxes keep their rows, which are zeros.
   int32_t leaves_gaps = 0;
 };
 
-/// A box that is in no scene. It is ignored unless `drawn`.
+/// A hypothetical box. It is ignored if box.drawn is 0.
 struct InsertedBox {
   AgentBox box;
-  float speed_mps = 0;  // signed, for the auxiliary slot
+  float speed_mps = 0;  // signed, along the heading; observed in the auxiliary slot
 };
 
-/// Queries, the lists that they refer to, and the output: one row per query, of the parts that the simulator observes.
+/// Queries, the lists to which they refer, and the output. The output has one row per query, in the arrays that the
+/// simulator observes.
 struct ObservationQueries {
   Span<const ObservationQuery> queries;
   Span<const int32_t> hidden;

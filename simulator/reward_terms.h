@@ -1,4 +1,4 @@
-// The eleven reward terms by name: the rewards of a step, and their sums.
+// The eleven terms of the reward, by name.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -36,7 +36,8 @@ struct RewardTermsOf {
 
 using RewardTerms = RewardTermsOf<float>;
 
-/// Per-step quantities of an agent that totals sum up; aligned to words of 16 bytes, which devices move whole.
+/// Quantities of an agent's step that are summed into SimulatorTotals. Aligned to 16 bytes, because GPUs copy 16 bytes
+/// with one instruction.
 struct alignas(16) StepSums {
   float distance_m = 0;
   RewardTerms reward_terms;

@@ -1,26 +1,27 @@
-// Rules of the world with several sensible variants, of which a configuration chooses one. Both devices read them.
+// Rules of the simulation that have several variants; a configuration chooses one. Code on the host and on GPUs reads
+// them.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// Coordination of a junction's traffic lights: the phases of the junction take turns, or each light cycles
-/// independently.
+/// Coordination of a junction's traffic lights. `phases`: groups of its lights are green in turn. `independent`: each
+/// light cycles on its own.
 enum class LightCycles : uint8_t { phases, independent };
 
-/// Rules for an agent's motion at rest, in addition to its dynamics (rules/dynamics.h).
+/// Options of an agent's dynamics (rules/dynamics.h).
 struct DynamicsRules {
-  /// Whether the longitudinal acceleration ends in the step in which the speed would change its sign; both then become
-  /// 0. Otherwise the acceleration persists and drives the agent on in the next step.
+  /// If true, speed and longitudinal acceleration become 0 in the step in which the speed would change its sign. If
+  /// false, the acceleration persists, so that the agent moves on in the next step.
   bool reset_at_standstill = false;
   bool operator==(const DynamicsRules&) const = default;
 };
 
 constexpr int kMaxOtherPolicies = 8;
 
-/// Shares of the agents that are impaired, or driven by other policies, drawn per episode. An agent is of at most one
-/// kind; all remaining agents learn.
+/// Shares of the agents that are impaired, or that other policies drive. Each episode draws them again. An agent
+/// belongs to at most one share; all remaining agents learn.
 struct OtherShares {
   float blind = 0;                         // at times it sees no other road user
   float phantom_braking = 0;               // at times it brakes hard

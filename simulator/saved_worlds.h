@@ -1,5 +1,5 @@
-// Worlds outside their simulator. Saved states of the worlds of one run are joined and split, so that another number of
-// simulators can restore them. Single worlds can be kept and continued in other simulators.
+// Saved states of worlds. The saved states of a run's simulators can be joined and split, so that a different number of
+// simulators can restore them. Single worlds can be saved and continued in other simulators.
 #pragma once
 
 #include <memory>
@@ -10,18 +10,18 @@
 
 namespace pictura {
 
-/// Returns the worlds of part `part` of `num_parts`: consecutive worlds, at least one per part, with about equally many
-/// agents in every part. Throws UsageError if there are fewer worlds than parts.
+/// Splits the worlds into num_parts parts of consecutive worlds and returns part `part`. Each part has at least one
+/// world, and all parts have about equally many agents. Throws UsageError if there are fewer worlds than parts.
 std::vector<WorldSpec> worlds_in_part(const std::vector<WorldSpec>& all, int part, int num_parts);
 
-/// Joins the saved states of the parts' simulators, in order, into the saved state of a simulator of all these worlds.
-/// `simulator` is one of the parts' simulators: it provides configuration and maps. Throws Error as Simulator::restore
-/// does.
+/// Joins the saved states of several simulators, one per part of worlds_in_part(), into the saved state of a simulator
+/// of all worlds. `simulator` is any simulator of these: it provides configuration and maps. Throws Error as
+/// Simulator::restore does.
 std::vector<uint8_t> join_saved_states(const Simulator& simulator, const std::vector<WorldSpec>& all,
                                        const std::vector<std::vector<uint8_t>>& parts);
 
-/// Extracts the saved state of `simulator`, which has part `part` of `num_parts`, from the saved state of a simulator
-/// of all these worlds. Throws Error as Simulator::restore does.
+/// Inverse of join_saved_states(): extracts the saved state of `simulator`, which simulates part `part` of `num_parts`,
+/// from the saved state of a simulator of all worlds. Throws Error as Simulator::restore does.
 std::vector<uint8_t> extract_saved_part(const Simulator& simulator, const std::vector<WorldSpec>& all,
                                         Span<const uint8_t> saved, int part, int num_parts);
 
@@ -32,9 +32,9 @@ struct SavedWorld;
 std::vector<std::shared_ptr<const SavedWorld>> extract_worlds(const Simulator& simulator, Span<const uint8_t> saved,
                                                               const std::vector<size_t>& worlds);
 
-/// Returns the saved state of this simulator with its worlds, in order, in these states: input of restore(). The worlds
-/// may come from simulators with other observations or other walls. Throws Error if a world differs from the kept
-/// one.
+/// Returns a state for simulator.restore() in which world i has the state worlds[i]. The saved worlds may come from
+/// simulators with other observations or other walls. Throws Error if a saved world does not fit the simulator's world:
+/// map, number of agents, id, boxes or lights.
 std::vector<uint8_t> saved_state_of(const Simulator& simulator, const std::vector<const SavedWorld*>& worlds);
 
 }  // namespace pictura

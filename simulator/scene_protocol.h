@@ -1,5 +1,5 @@
 // Settings of evaluations in recorded scenes: the paper's zero-shot protocol, protocols of other published results, and
-// every rule that can be changed. Has no torch headers.
+// every rule that a caller can change.
 #pragma once
 
 #include <string>
@@ -18,54 +18,56 @@ enum class Late : uint8_t { replay, drive, absent };
 enum class RecordEnd : uint8_t { stand, vanish };
 enum class Waypoints : uint8_t { goal, path };
 
-/// Protocol: the driven road users, their goals, and the treatment of events. The default values are the paper's
-/// (zero-shot evaluation, appendix B). If the paper states no value, the default is this project's choice;
-/// docs/explanation/evaluation.md lists these choices.
+/// Protocol of an evaluation: the road users that the policy drives, their goals, and the treatment of events. The
+/// default values are the paper's (zero-shot evaluation, appendix B). If the paper states no value, the default is this
+/// project's choice; docs/explanation/evaluation.md lists these choices.
 struct SceneProtocol {
   std::string name = "womd";
-  std::string control = "self,vehicles";  // tracks_selected_by() of the scene
+  std::string control = "self,vehicles";  // driven road users: words for tracks_selected_by()
   int start_step = 0;                     // step of the recording at which episodes begin
   int steps = 600;
   std::vector<double> densities{1.0, 0.75, 0.5};  // shares of a scene's road users that remain
-  int rollouts = 1;                               // number of drives of each scene, each with its own random draws
-  float box_scale = 1;                            // scale of all lengths and widths
+  int rollouts = 1;                               // number of times that each scene is driven, each with its own random
+                                                  // draws
+  float box_scale = 1;                            // factor on the length and width of all boxes
   // Minimum distance from the start to the goal; a road user that starts nearer follows the recording. 0: no minimum.
   float min_distance_to_goal_m = 2;
-  bool replay_experts = false;  // replays road users that the file marks as experts
-  // > 0: maximum number of driven road users per scene: the self-driving car, then others in the order of the file.
+  bool replay_experts = false;  // whether road users that the scene file marks as experts follow the recording
+  // Maximum number of driven road users per scene; 0: no limit. The self-driving car has priority, then the order of
+  // the scene file.
   int max_driven = 0;
-  // Role of road users whose initial box touches another box or an edge, or is off the road.
+  // Role of road users whose initial box touches another box or the road's edge, or is off the road.
   Overlapping overlapping = Overlapping::replay;
   Others others = Others::replay;  // role of pedestrians, cyclists and other non-vehicles that `control` excludes
   Late late = Late::replay;
   RecordEnd record_end = RecordEnd::stand;  // behavior of replayed road users after the end of their recording
   AfterInfraction after_infraction = AfterInfraction::halt;
   bool leave_at_goal = true;
-  Waypoints waypoints = Waypoints::goal;  // three times the goal, or two points on the recorded path and the goal
+  Waypoints waypoints = Waypoints::goal;  // `goal`: the goal three times; `path`: two points on the recorded path, then
+                                          // the goal
   float observed_span_m = 5;              // see MapOptions
 };
 
-/// Returns the protocols: the paper's, gpudrive, pufferdrive2, pufferdrive3, waymax and simagents, all defined in this
-/// one place.
+/// Returns the protocols: womd (the paper's), gpudrive, pufferdrive2, pufferdrive3, waymax and simagents.
 const std::vector<SceneProtocol>& scene_protocols();
 std::vector<std::string> scene_protocol_names();
-/// Returns the protocol of this name. Throws UsageError listing the names.
+/// Returns the protocol of this name. Throws UsageError, which lists the names, for another name.
 SceneProtocol scene_protocol(const std::string& name);
 
-/// Setting that can be changed by name.
+/// Setting of a protocol that set_scene_rule() can change.
 struct SceneRule {
   const char* name;
   const char* values;  // for instance "replay, drive, absent" or "0 to 2"
   const char* what;
 };
 std::vector<SceneRule> scene_rules();
-/// Sets a rule from "name=value". Throws UsageError listing names or values.
+/// Sets a rule from "name=value". Throws UsageError, which lists the valid names or values, for another name or value.
 void set_scene_rule(const std::string& assignment, SceneProtocol* protocol_inout);
 /// Returns names and values of all rules.
 std::vector<std::pair<std::string, std::string>> rules_of(const SceneProtocol& protocol);
 
-/// Throws UsageError naming an invalid setting, for instance steps below 1, a density outside (0, 1], or a word of
-/// `control` that selects no kind of tracks.
+/// Throws UsageError, which names the setting, if a setting is invalid: for instance steps below 1, a density outside
+/// (0, 1], or a word in `control` that names no kind of tracks, such as an id.
 void check(const SceneProtocol& protocol);
 
 /// Row of the paper's table on WOMD (zero-shot self-play, 44,073 scenes of the validation set).

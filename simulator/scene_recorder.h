@@ -1,4 +1,4 @@
-// Recording of a simulated world as a scene, step by step, so that driven traffic can be replayed to other agents.
+// Recording of a simulated world as a scene, so that other agents can later drive among the recorded traffic.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@
 
 namespace pictura {
 
-/// Records one episode of a world in host memory: controlled agents, then parked cars, as tracks, and the states of its
-/// lights as recorded lights.
+/// Records one episode of a world. Controlled agents, then parked cars become the tracks of a scene. Light states
+/// become its recorded lights. The simulator must work in host memory.
 class SceneRecorder final : public StepObserver {
  public:
-  /// Records the simulator's state as the first step; the simulator must outlive the recorder. Throws UsageError if the
-  /// simulator does not work in host memory or lacks the world.
+  /// Records the simulator's current state as the first step. The simulator must outlive the recorder. Throws
+  /// UsageError if the simulator does not work in host memory, or if it has no such world.
   explicit SceneRecorder(Simulator& simulator, int world = 0);
 
   /// Records a step of the episode; steps after the episode are ignored. Throws Error if the scene would become too
@@ -28,16 +28,17 @@ class SceneRecorder final : public StepObserver {
   bool is_over() const { return is_over_; }
   int32_t num_steps() const { return num_steps_; }
 
-  /// Returns the scene so far. Its tracks are the agents that were present at any step; their ids are the indices of
-  /// their boxes in the world. On roads that end, each life is a track; the id of life k is that of the first life plus
-  /// k times the number of boxes. self_agent: agent of the self-driving car's track; -1: none. In a world of a recorded
-  /// scene, ids, types, recorded lights and the self-driving car are those of that scene. An empty id is replaced by
-  /// one of the map's name, seed, world and episode. Throws UsageError for an agent that was never present.
+  /// Returns the scene so far. Its tracks are the agents that were present at any step. The id of a track is the index
+  /// of the agent's box in the world. On roads that end, each life is a track: life k of box b (both from 0) has the id
+  /// b plus k times the number of boxes. self_agent is the agent whose track is the self-driving car; -1: none. In a
+  /// world of a recorded scene, ids, types, recorded lights and the self-driving car are those of that scene. An empty
+  /// `id` is replaced by an id made of the map's name, seed, world and episode. Throws UsageError if self_agent was
+  /// never present.
   Scenario scenario(std::string id = "", int self_agent = -1) const;
 
  private:
   Span<const AgentBox> boxes() const;
-  /// Called after every event that may have been a step of the episode.
+  /// Records the current state if the simulator took another step of the recorded episode.
   void follow();
   void add_step();
 

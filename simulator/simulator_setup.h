@@ -1,5 +1,5 @@
-// Parts of a simulator that stay constant while it steps: its configuration, maps and worlds, all checked, and the
-// range of each world in the arrays.
+// Data of a simulator that stay constant while it steps: its configuration, maps and worlds, all checked, and the range
+// of each world in the arrays.
 #pragma once
 
 #include <memory>
@@ -13,12 +13,13 @@
 namespace pictura {
 
 struct SimulatorSetup : SimulatorParts {
-  /// Checks all input: throws UsageError for parts that cannot be simulated. handles [maps] are the handles of the maps
-  /// in the scene; empty for 0, 1, ...
+  /// Checks the input and throws UsageError if it cannot be simulated. handles: [maps] handles by which scenes refer to
+  /// maps, or empty for 0, 1, ...
   SimulatorSetup(const SimulatorConfig& config, CompiledMaps maps, std::vector<GeometryHandle> handles,
                  std::vector<WorldSpec> worlds);
 
-  /// Returns a setup with the same configuration except for the seed, and other worlds; empty handles mean 0, 1, ...
+  /// Returns a setup with other maps and worlds, and the same configuration with another seed. Empty handles mean 0, 1,
+  /// ...
   SimulatorSetup with(CompiledMaps other_maps, std::vector<GeometryHandle> other_handles,
                       std::vector<WorldSpec> other_worlds, uint64_t seed) const;
 
@@ -33,10 +34,11 @@ struct SimulatorSetup : SimulatorParts {
   /// Whether any map has replayed tracks.
   bool has_replayed_tracks() const;
   SimulatorCapacity needs() const { return capacity_of(maps, worlds); }
-  /// Allocates for this capacity, so that assigning another setup within it moves no array.
+  /// Allocates for this capacity. Assigning another setup within the capacity then moves no array.
   void reserve(const SimulatorCapacity& capacity);
 
-  /// Returns a world's view, without state: its map, its range in the arrays and the keys of its random numbers.
+  /// Returns the WorldView of a world with its map, its range in the arrays and the keys of its random numbers.
+  /// Pointers to state are not set.
   WorldView view(int world, const MapView& map, const RuleOptions& its_options) const;
 
   RuleOptions options;
@@ -47,14 +49,15 @@ struct SimulatorSetup : SimulatorParts {
   std::vector<GeometryHandle> geometry;                     // [worlds] handle of the world's map
 };
 
-/// Identity of the worlds of a snapshot: only a simulator with its current worlds and the snapshots of these worlds
-/// hold the same token.
+/// Token that identifies a simulator's current worlds. A snapshot holds the token of its worlds; set_worlds() makes a
+/// new token, so that older snapshots no longer match.
 using WorldsToken = std::shared_ptr<const char>;
 inline WorldsToken new_worlds_token() { return std::make_shared<const char>(); }
 
-/// Side of the cells into which hosts sort a world's boxes; see HostWorlds.
+/// Side of the square cells into which a world's boxes are sorted; see HostWorlds.
 constexpr float kBoxCell_m = 25.0f;
-/// Numbers of cells that cover a map. 64 bits, since maps that are too large to be simulated are counted too.
+/// Numbers of cells that cover a map. They have 64 bits, because maps that are too large to be simulated are counted
+/// too.
 struct BoxCellCounts {
   int64_t num_x, num_y;
 };

@@ -1,5 +1,5 @@
-// State of a simulator on the host: all saved data. An executor on the host steps it; an executor on a device mirrors
-// it there. Saving, restoring, hashing and counting are shared by all executors.
+// State of a simulator in host memory: all data that are saved. The executor `cpu` steps this state; the executor
+// `cuda` has a copy in device memory. Both use the functions below for saving, restoring, hashing and counting.
 #pragma once
 
 #include <vector>
@@ -16,41 +16,42 @@ struct SimulatorState {
   explicit SimulatorState(const SimulatorSetup& setup) { resize(setup); }
   /// Resizes all arrays for the setup and sets initial values.
   void resize(const SimulatorSetup& setup);
-  /// Allocates for this capacity, so that a resize within it moves no array; the number of boxes depends on `config`.
+  /// Allocates for this capacity. A resize within the capacity then moves no array. `config` gives the number of parked
+  /// cars.
   void reserve(const SimulatorCapacity& capacity, const SimulatorConfig& config);
 
   SpawnReport spawn_report(const SimulatorSetup& setup) const;
   SimulatorTotals totals() const;
-  /// Hash of every field of the agents, the light states and the parked cars, in the documented order.
+  /// Hash of the agents' fields, the light states and the parked cars.
   uint64_t hash(const SimulatorSetup& setup) const;
 
-  /// Copies the state of `count` worlds, which must have equal sizes in both, from world `from_world` of another
-  /// simulator.
+  /// Copies the state of `count` worlds of another simulator, from `from_world` on, to the worlds from `world` on. Each
+  /// pair of worlds must have equal sizes.
   void copy_worlds(const SimulatorSetup& setup, int world, const SimulatorState& from, const SimulatorSetup& from_setup,
                    int from_world, int count);
 
   std::vector<uint8_t> save(const SimulatorSetup& setup) const;
-  /// Restores a saved state. Throws Error, leaving everything unchanged, when the bytes are of another simulator,
-  /// naming the difference, or when a field has a value that no simulator saves.
+  /// Restores a saved state. Throws Error, leaving everything unchanged, if the bytes come from a different simulator
+  /// (the message names the difference), or if a field has an invalid value.
   void restore(const SimulatorSetup& setup, Span<const uint8_t> bytes);
 
   AgentState agents;
   std::vector<AgentBox> boxes, boxes_before;  // the scene's agents
   std::vector<LightPlan> light_plans;
   std::vector<LightState> lights;
-  std::vector<uint64_t> seed;                        // [worlds] seed of its random numbers
+  std::vector<uint64_t> seed;                        // [worlds] seeds of random numbers
   std::vector<int32_t> episode_step, episode_index;  // [worlds]
   std::vector<uint8_t> episode_over;                 // [worlds] 1: the next step resets the world
   std::vector<int32_t> spawned;                      // [worlds] number of agents in the current episode
   std::vector<SimulatorTotals> world_totals;         // [worlds]
 
-  /// Calls visit(array of a, array of b) for every array of the state except the agents' fields, in the order of
-  /// saving. a and b must have members of the same names.
+  /// Calls visit(a.array, b.array) for every array of the state except the agents' fields, in the order of saving. A
+  /// and B need not be the same type, but must have members with the same names.
   template <typename A, typename B, typename Visit>
   static void visit_arrays(A& a, B& b, Visit&& visit) {
     visit_arrays_by_kind(a, b, visit, visit, visit);
   }
-  /// Variant of visit_arrays() with separate visitors for arrays by box, by light and by world.
+  /// Variant of visit_arrays() with separate visitors for arrays indexed by box, by light and by world.
   template <typename A, typename B, typename OfBoxes, typename OfLights, typename OfWorlds>
   static void visit_arrays_by_kind(A& a, B& b, OfBoxes&& of_boxes, OfLights&& of_lights, OfWorlds&& of_worlds) {
     of_boxes(a.boxes, b.boxes);
@@ -66,17 +67,17 @@ struct SimulatorState {
   }
 
  private:
-  /// Size of the state in bytes without its header, and copies to and from bytes; with or without the lives of agents.
+  /// Size of the saved state without its header, and copies to and from bytes; with or without the fields of lives.
   size_t saved_bytes(bool with_lives) const;
   void copy_to(uint8_t* bytes_out, bool with_lives) const;
   void assign_from(const uint8_t* bytes, bool with_lives);
 };
 
-/// Returns the text of an Error about a command that a step rejected, see rejected_command().
+/// Returns the error message for a rejected command. `rejected` is a result of rejected_command().
 std::string rejection_text(int64_t rejected);
-/// Returns the text of an Error about a fault of find_edit_fault().
+/// Returns the error message for a result of find_edit_fault().
 std::string edit_fault_text(int64_t fault, int num_slots);
-/// Returns the text of an Error about a fault of find_query_fault().
+/// Returns the error message for a result of find_query_fault().
 std::string query_fault_text(int64_t fault, int num_slots);
 
 }  // namespace pictura

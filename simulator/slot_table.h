@@ -1,4 +1,4 @@
-// World and agent of each slot, as both devices read them.
+// World and agent of each slot. A plain struct for host and device code.
 #pragma once
 
 #include "pictura/common/span.h"

@@ -1,4 +1,5 @@
-// New values of some fields of some agents: the input of Simulator::set_state. A plain struct that both devices read.
+// New values of some fields of some agents: the input of Simulator::set_state(). A plain struct for host and device
+// code.
 #pragma once
 
 #include "pictura/simulator/fields.h"
@@ -15,7 +16,7 @@ enum class AgentField : int32_t {
 struct StateEdit {
   int32_t count = 0;
   const int32_t* slots = nullptr;  // [count]
-// Each array is [count, per agent]; null: the field stays unchanged.
+// Arrays of new values, [count, per agent]. The field of a null pointer stays unchanged.
 #define X(name, type, per_agent, first, comment) const type* name = nullptr;
   PICTURA_AGENT_FIELDS(X)
 #undef X

@@ -1,5 +1,5 @@
-// Totals of a simulator. Floating-point sums have the same order on every executor: agent i of a world adds to bin i
-// mod kTotalsBins, and the bins are added in order.
+// Totals of a simulator. Every executor adds floating-point numbers in the same order, so that sums are bit-identical:
+// agent i of a world adds to bin i mod kTotalsBins, and the bins are added in order.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -11,7 +11,7 @@ constexpr int kTotalsBins = 32;
 
 constexpr float kRest_mps = 0.3f;  // agents up to this speed count as at rest
 
-// X(total, name in a run's log, events): counts of agent-steps with any of these events.
+// X(total, name in a run's log, events): number of agent-steps with at least one of the events.
 #define PICTURA_EVENT_TOTALS(X)                                \
   X(goals_reached, goals, kEventMetricGoal)                    \
   X(waypoints_reached, waypoints, kEventWaypoint | kEventGoal) \
@@ -21,7 +21,8 @@ constexpr float kRest_mps = 0.3f;  // agents up to this speed count as at rest
   X(red_light, red_light, kEventRedLight)                      \
   X(wall_contacts, wall_contacts, kEventWall)
 
-// COUNT(total, ...) of an integer, SUM(total) of a floating-point number, TERMS(total) of a sum per reward term.
+// COUNT(total, ...) declares an integer, SUM(total) a floating-point sum, TERMS(total) a floating-point sum for each
+// reward term.
 #define PICTURA_TOTALS(COUNT, SUM, TERMS)                                                      \
   COUNT(agent_steps) /* active agents advanced by one step */                                  \
   COUNT(slot_steps)  /* slots times steps */                                                   \
@@ -36,7 +37,7 @@ constexpr float kRest_mps = 0.3f;  // agents up to this speed count as at rest
   COUNT(finished_moved)           /* of these agents, those faster than kRest_mps in a step */ \
   SUM(finished_first_motion_s)    /* over moved agents: time from the start to the end of that step */
 
-/// Totals since construction; counts are of controlled agents.
+/// Totals of controlled agents since the simulator's construction.
 struct SimulatorTotals {
 #define COUNT(name, ...) int64_t name = 0;
 #define SUM(name) double name = 0;
@@ -47,10 +48,10 @@ struct SimulatorTotals {
 #undef TERMS
 
   PICTURA_HD void add(const SimulatorTotals& part) { visit(*this, part, Add{}, Add{}); }
-  /// Subtracts earlier totals, which leaves the counts since `before`.
+  /// Subtracts earlier totals. The result counts what has happened since `before`.
   PICTURA_HD void subtract(const SimulatorTotals& before) { visit(*this, before, Subtract{}, Subtract{}); }
 
-  /// Calls visit_count(member of a, member of b) for all counts, and visit_sum for all floating-point sums.
+  /// Calls visit_count(a.total, b.total) for all counts, and visit_sum(a.total, b.total) for all floating-point sums.
   template <typename Other, typename VisitCount, typename VisitSum>
   PICTURA_HD static void visit(SimulatorTotals& a, Other& b, const VisitCount& visit_count, const VisitSum& visit_sum) {
 #define COUNT(name, ...) visit_count(a.name, b.name);

@@ -1,5 +1,5 @@
-// Walkways of pedestrians: the centre lines of sidewalks (of shoulders on maps without sidewalks) and crosswalks, as a
-// network of straight pieces that are walked in both directions.
+// Walkways of pedestrians: the centre lines of sidewalks and crosswalks, as a network of straight pieces. On maps
+// without sidewalks, shoulders replace them. Pedestrians walk in both directions.
 #pragma once
 
 #include <vector>
@@ -11,13 +11,14 @@ namespace pictura {
 
 struct Walkways {
   std::vector<WalkPiece> pieces;     // in pairs, one per direction
-  std::vector<float> end_m;          // [pieces] running sum of lengths
+  std::vector<float> end_m;          // [pieces] running sum of the pieces' lengths
   std::vector<int32_t> leave_begin;  // [nodes + 1] into `leaving`
   std::vector<int32_t> leaving;      // pieces that leave each node
 };
 
-/// Makes the walkways of a map. Pieces on the drivable surface of `roads` (its lanes and their cells) are omitted,
-/// except on crosswalks; so are networks shorter than kMinWalk_m. Empty if the map has no walkways.
+/// Makes the walkways of a map. Omits pieces on the drivable surface of `roads`, except on crosswalks, and connected
+/// networks with a total length below kMinWalk_m. `roads` needs only its lanes and their cells. The result is empty if
+/// the map has no walkways.
 Walkways make_walkways(const RoadMap& map, const MapView& roads);
 
 constexpr float kMinWalk_m = 40.0f;

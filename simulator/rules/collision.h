@@ -1,5 +1,5 @@
-// Contact of oriented boxes: with each other, over the whole step so that nothing tunnels, and with barriers. Fault is
-// assigned as in the paper (appendix, metric definitions).
+// Contact of oriented boxes with each other and with barriers. Contact with other boxes is tested over the whole step,
+// so that fast agents cannot pass through each other. Fault is assigned as in the paper (appendix, metric definitions).
 #pragma once
 
 #include "pictura/common/math.h"
@@ -57,8 +57,8 @@ PICTURA_HD inline OrientedBox between(const AgentBox& from, const AgentBox& to, 
   return box;
 }
 
-/// Whether two boxes that move during a step touch on the way or at its end. The way is divided so finely that between
-/// two tests the boxes approach each other by less than the width of the narrower box.
+/// Whether two boxes touch while they move during a step, or at its end. The motion is sampled so finely that between
+/// two samples the boxes approach each other by less than the width of the narrower box.
 PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, const AgentBox& b_from,
                                const AgentBox& b_to) {
   const Vec2 a_path = (a_to.center_m - a_from.center_m).xy();
@@ -76,10 +76,11 @@ PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, con
   return false;
 }
 
-/// Whether an agent is at fault (paper): unless it is essentially stopped or struck from behind. An agent that does not
-/// reverse is struck from behind if the nearer end of the other box lay behind the plane of the agent's rear bumper
-/// before the step, when the boxes did not touch yet. That end is the middle of the other box's front, or of its rear
-/// if it backs up. The speed is that of the step.
+/// Whether an agent is at fault for a collision (paper): it is not if it is almost at rest or struck from behind. A
+/// reversing agent is never struck from behind. Any other agent is struck from behind if, before the step, the nearer
+/// end of the other box was behind the plane of the agent's rear bumper. The nearer end is the middle of the other
+/// box's front or rear, whichever is farther forward in the agent's frame. own_speed_mps is the agent's speed in the
+/// step.
 PICTURA_HD inline bool at_fault(const AgentBox& own_before, float own_speed_mps, const AgentBox& other_before) {
   constexpr float kStopped_mps = 0.2f;
   if (fabsf(own_speed_mps) < kStopped_mps) return false;
@@ -115,8 +116,8 @@ PICTURA_HD inline bool touches(const OrientedBox& box, Vec2 a_m, Vec2 b_m) {
   return true;
 }
 
-/// Whether the box touches any barrier on its level. Boxes are longer than the way of a step, so that consecutive boxes
-/// overlap and no barrier is passed undetected.
+/// Whether the box touches any barrier on its level. A test at the end of each step suffices: boxes are longer than
+/// their motion in a step, so that consecutive boxes overlap.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool touches_any(const OrientedBox& box, float z_m, Span<const Barrier> barriers, const GridView& cells,
                             const ThreadGroup& group = {}) {

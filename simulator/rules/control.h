@@ -1,4 +1,4 @@
-// Controllers that need only a slot's index or a table, with the same rule on every executor.
+// Controllers that compute a command from a slot's index or a table. All executors share this code.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -18,13 +18,13 @@ PICTURA_HD inline int32_t random_action(uint64_t seed, uint32_t global_world, in
   return random.below(kNumActions);
 }
 
-/// Number of steps of a world since its simulator was made, including the steps that began episodes.
+/// Number of steps of a world since the construction of its simulator, including the steps that began episodes.
 PICTURA_HD inline uint32_t steps_of(const SimulatorTotals& world_totals, int32_t num_agents) {
   return static_cast<uint32_t>(world_totals.slot_steps / num_agents);
 }
 
-/// Random actions, keyed by the world, the agent in the world, and the world's number of steps. They have no state of
-/// their own, so that a restored simulator continues with the same actions.
+/// Random actions. Each depends only on seed, world, agent and the world's number of steps. Because there is no further
+/// state, a restored simulator continues with the same actions.
 struct RandomCommands {
   uint64_t seed;
   SlotTable slots;
@@ -54,13 +54,13 @@ struct RecordedCommands {
   }
 };
 
-/// Place of a world's actions in TabledCommands::actions: [agents, num_steps] from `first` on.
+/// Location of a world's actions in TabledCommands::actions: an array [agents, num_steps] that starts at index `first`.
 struct ActionTable {
   int64_t first = 0;
   int32_t num_steps = 0;
 };
 
-/// Commands from tables, for num_steps steps of each episode; no jerk afterwards.
+/// Actions from a table for the first num_steps steps of each episode; after these, actions without jerk.
 struct TabledCommands {
   SlotTable slots;
   Span<const int32_t> episode_step;  // [worlds]

@@ -1,4 +1,4 @@
-// Agents whose state is set from outside: validation of values, and fields that follow from them.
+// Implementation of Simulator::set_state(): validation of new values, and computation of derived fields.
 #pragma once
 
 #include "pictura/simulator/command.h"
@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// Returns the first field of an agent with a value that no simulator writes and that cannot be simulated, or `none`.
+/// Returns the first field of an agent with an invalid value, or `none`.
 PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions& options, const AgentStateView& agents,
                                            int slot) {
 #define X(name, type, per_agent, first, comment)                                                      \
@@ -53,7 +53,7 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   return AgentField::none;
 }
 
-/// Fields of one agent, stored outside of the state's arrays.
+/// Copy of the fields of one agent, outside the state's arrays.
 struct AgentRecord {
 #define X(name, type, per_agent, first, comment) type name[per_agent];
   PICTURA_AGENT_FIELDS(X)
@@ -66,7 +66,7 @@ struct AgentRecord {
   }
 };
 
-/// Returns the agent of element i with the edit applied, except for fields that follow from others.
+/// Returns a copy of the agent of the edit's element i with the edit applied. Derived fields are not recomputed.
 PICTURA_HD inline AgentRecord edited_agent(const AgentStateView& agents, const StateEdit& edit, int i) {
   AgentRecord record;
   copy_fields(agents, edit.slots[i], record.view(), 0);
@@ -77,8 +77,8 @@ PICTURA_HD inline AgentRecord edited_agent(const AgentStateView& agents, const S
   return record;
 }
 
-/// Fault of an element of an edit, in one word that a host reads atomically: a field's number or one of the constants
-/// below, the element and the slot.
+/// Error of an element of an edit, encoded in one 64-bit word that a host can read atomically. It contains the index of
+/// the field or one of the constants below, the index of the element, and the slot.
 constexpr int64_t kNoEditFault = -1;
 constexpr int32_t kNoSuchSlot = static_cast<int32_t>(AgentField::none), kSlotAgain = kNoSuchSlot + 1;
 PICTURA_HD constexpr int64_t edit_fault(int32_t what, int32_t element, int32_t slot) {
@@ -89,8 +89,8 @@ PICTURA_HD inline bool has_slot(const StateEdit& edit, int i, int num_slots) {
   return edit.slots[i] >= 0 && edit.slots[i] < num_slots;
 }
 
-/// Returns the fault of element i. first_element [slots]: first element of the edit for each slot. world_of(slot): its
-/// WorldView.
+/// Returns the error of element i, or kNoEditFault. first_element [slots]: index of the first element of the edit for
+/// each slot. world_of(slot) must return the WorldView of the slot's world.
 template <typename WorldOf>
 PICTURA_HD int64_t find_edit_fault(const StateEdit& edit, int i, int num_slots, const int32_t* first_element,
                                    const WorldOf& world_of) {
@@ -103,7 +103,7 @@ PICTURA_HD int64_t find_edit_fault(const StateEdit& edit, int i, int num_slots, 
   return field == AgentField::none ? kNoEditFault : edit_fault(static_cast<int32_t>(field), i, slot);
 }
 
-/// Writes the agent of element i, which must be without fault, into its world. The agent appears there at once, without
+/// Writes the agent of element i, which must be without error, into its world. The agent is moved without testing
 /// collisions on the way. Returns the change in the number of agents in the world's episode.
 PICTURA_HD inline int apply_edit(const WorldView& world, const StateEdit& edit, int i) {
   const AgentStateView& agents = world.agents;

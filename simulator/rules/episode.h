@@ -1,4 +1,4 @@
-// A world's episode: its lights, what a step returns and counts, and when it ends.
+// A world's episode: its lights, the results and counts of a step, and the end of the episode.
 #pragma once
 
 #include "pictura/simulator/rules/step.h"
@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// Destinations of a step's results: arrays over all slots, named as in StepResult.
+/// Arrays [slots] to which a step writes its results; see StepResult.
 struct StepArrays {
   float* reward = nullptr;
   uint8_t* terminated = nullptr;
@@ -21,15 +21,15 @@ PICTURA_HD inline void clear_result(const StepArrays& results, int slot) {
   results.sums[slot] = {};
 }
 
-/// Whether a command is valid. Commands to an agent that takes no actions are ignored, so any such command is valid.
-/// Commands to follow a record need a record.
+/// Whether a step accepts a command. Any command to an agent that takes no actions is accepted, because it is ignored.
+/// A command to follow a record needs a map with a record.
 template <typename CommandType>
 PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& command) {
   if (!takes_actions(world, agent)) return true;
   return is_valid(command) && (has_record(world.map) || !is_follow_record_command(command));
 }
 
-/// Whether a step of the agent counts and is used for learning: the agent takes actions, the command is neither to
+/// Whether a step of the agent is counted and used for learning: the agent takes actions, the command is neither to
 /// leave nor to follow the record, and in this episode the agent is neither impaired nor driven by another policy.
 template <typename CommandType>
 PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType& command) {
@@ -37,9 +37,9 @@ PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType&
          driver_kind_of(world, agent) == 0;
 }
 
-/// Whether the agent counts as driving when a world decides whether its episode ends. Agents that wait to enter count.
-/// Agents that follow a record count even at steps without a recorded state, unless some tracks are replayed: then all
-/// agents are present from the start.
+/// Whether the agent counts as active in the test whether the episode ends. Agents that wait to enter count. Absent
+/// agents of a map with a record count too, because they may appear later; but not if some tracks are replayed, because
+/// then all agents are present from the start.
 PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
   const auto status = world.agents.status[world.first_slot + agent];
   if (has_replayed_tracks(world.map)) return takes_actions(status);
@@ -47,7 +47,8 @@ PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
          (status == AgentStatus::absent && has_record(world.map));
 }
 
-/// Rejected command of a step, in one word that a host reads atomically: slot, kind and, for an action, its value.
+/// Description of a step's rejected command, encoded in one 64-bit word that a host can read atomically: slot, kind
+/// and, for an action, its value.
 constexpr int64_t kNoRejection = -1;
 PICTURA_HD constexpr int64_t rejected_command(int32_t slot, CommandKind kind, int32_t action) {
   const auto kind_bits = static_cast<int64_t>(static_cast<uint32_t>(kind) < 4 ? static_cast<uint32_t>(kind) : 4u);
@@ -60,7 +61,7 @@ PICTURA_HD constexpr int64_t rejected_command(int32_t slot, const Command& comma
   return rejected_command(slot, command.kind, command.kind == CommandKind::action ? command.action : 0);
 }
 
-/// Draws the episode's cycle of one stop line and sets its first state.
+/// Draws the light plan of one stop line for the episode and sets its first state.
 PICTURA_HD inline void begin_light(const WorldView& world, int light) {
   world.light_plans[light] =
       draw_light_plan(world.map.stop_lines[light], light, world.options.light_cycles, world.options.fixed_lights,
@@ -74,7 +75,8 @@ PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout){
 #undef X
 }
 
-/// Phase 3 of one agent in step `step` of the episode, counted from 1: writes its reward and its end.
+/// Phase 3 (see step.h) of one agent in step `step` of the episode, counted from 1: writes its reward and whether its
+/// episode ends.
 PICTURA_HD inline void apply_reward_and_halt(const WorldView& world, int agent, int step, const StepArrays& results) {
   const int slot = world.first_slot + agent;
   const float speed_mps = world.agents.speed_mps[slot];
@@ -84,7 +86,7 @@ PICTURA_HD inline void apply_reward_and_halt(const WorldView& world, int agent, 
   if (drives && first_motion_step == 0 && fabsf(speed_mps) > kRest_mps) first_motion_step = step;
   const float distance_m = results.valid[slot] ? driven_m(speed_mps, world.options.dt_s) : 0.0f;
   StepSums sums{distance_m, apply_reward_and_halt(world, agent)};
-  if (is_other) sums = {};  // other agents are not counted
+  if (is_other) sums = {};  // steps of impaired agents and of other policies are not counted
   results.sums[slot] = sums;
   results.reward[slot] = sums.reward_terms.total();
   results.terminated[slot] = results.valid[slot] && !is_active(world, agent) && !has_left(world, agent);
@@ -105,9 +107,9 @@ PICTURA_HD inline void count_agent(const WorldView& world, int agent, const Step
   count_events(world.agents.events[slot], totals_inout);
 }
 
-/// Steps after which the world's episode ends unless it ends earlier: episode_steps of the options. In staggered
-/// worlds, the first episode instead has U{64, ..., episode_steps} steps, drawn per world, so that worlds that begin
-/// together do not always end together. With episode_steps of at most 64, all episodes have full length.
+/// Returns the maximum number of steps of the world's current episode: options.episode_steps. With stagger_episodes, a
+/// world's first episode has U{64, ..., episode_steps} steps instead, so that episodes of different worlds do not end
+/// at the same time. If episode_steps is at most 64, all episodes have this length.
 PICTURA_HD inline int max_steps_of(const WorldView& world) {
   constexpr int kMinSteps = 64;
   const int episode_steps = world.options.episode_steps;
@@ -116,16 +118,17 @@ PICTURA_HD inline int max_steps_of(const WorldView& world) {
   return kMinSteps + random.below(episode_steps - kMinSteps + 1);
 }
 
-/// Whether an episode ends after `steps` steps, with `spawned` agents of which `active` still drive: the time is up,
-/// too many agents are inactive, or there are no agents.
+/// Whether an episode of `spawned` agents, of which `active` are still active, ends after `steps` steps: the maximum
+/// number of steps is reached, too many agents are inactive, or there are no agents.
 PICTURA_HD inline bool episode_ends(const WorldView& world, int steps, int spawned, int active) {
   if (steps >= max_steps_of(world) || spawned == 0) return true;
   const float inactive = static_cast<float>(spawned - active);
   return inactive >= world.options.reset_inactive_fraction * static_cast<float>(spawned);
 }
 
-/// Finishes a step of an agent once it is known whether the world's episode ends with the step: truncates agents that
-/// still drive and agents that have left, and counts finished episodes and lives.
+/// Finishes a step of an agent. `ends` is whether the world's episode ends with the step. Sets `truncated` for agents
+/// that are still active at the end of the episode and for agents that have left, and counts finished episodes and
+/// lives.
 PICTURA_HD inline void finish_agent(const WorldView& world, int agent, bool ends, const StepArrays& results,
                                     SimulatorTotals* totals_inout) {
   const int slot = world.first_slot + agent;

@@ -1,5 +1,7 @@
-// Goal chains: three waypoints along the lane network, 20 to 60 m apart along the route, lane changes included, and the
-// test whether a waypoint is passed. Routes use endless lanes only; on open maps they end before the lanes do.
+// Goal chains: three waypoints on a random route along the lane network, which may change lanes. The waypoints are 20
+// to 60 m apart along the route. Also the test whether a waypoint is passed. On maps whose roads do not end, routes use
+// only lanes from which they can continue without end. On open maps, whose roads end, routes end shortly before the
+// lanes do.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -9,13 +11,14 @@ namespace pictura {
 
 constexpr float kMinWaypointGap_m = 20.0f, kMaxWaypointGap_m = 60.0f;
 constexpr float kLaneChangeChance = 0.25f;
-/// Maximum height difference to a waypoint at which it can be passed.
+/// A waypoint can be passed only if the agent's height differs by less than this from the waypoint's height.
 constexpr float kWaypointLevel_m = 4.0f;
-/// Maximum distance at which passing a last waypoint counts for the metric Goals (paper, metric definitions).
+/// The metric Goals counts the last waypoint of a chain if an agent passes it within this distance (paper, metric
+/// definitions).
 constexpr float kMetricGoalRadius_m = 2.0f;
 
-/// Returns the neighbour of a point (`side` < 0: left, else right) at the same fraction of its lane; the point itself
-/// if there is none.
+/// Returns the point beside `at` on the neighbouring lane (`side` < 0: left, else right), at the same fraction of the
+/// lane's length. Returns `at` if there is no such lane.
 PICTURA_HD inline RoutePoint neighbor_of(const MapView& map, RoutePoint at, int side) {
   const MapLane& lane = map.lanes[at.lane];
   const int32_t neighbor = side < 0 ? lane.left : lane.right;
@@ -23,9 +26,8 @@ PICTURA_HD inline RoutePoint neighbor_of(const MapView& map, RoutePoint at, int 
   return {neighbor, at.s_m * (map.lanes[neighbor].length_m / lane.length_m)};
 }
 
-/// Returns the point beside `at` on the nearest lane with a successor, over as many lane changes as needed; of two
-/// equally near lanes, the left. Returns `at` itself if its own lane has a successor, or if no lane beside it has a
-/// successor.
+/// Returns the point beside `at` on the nearest neighbouring lane that has a successor; of two equally near lanes, the
+/// left. Returns `at` itself if its own lane has a successor, or if no lane beside it has a successor.
 PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
   const auto goes_on = [&map](RoutePoint p) { return map.lanes[p.lane].num_successors > 0; };
   RoutePoint left = at, right = at;
@@ -38,8 +40,9 @@ PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
   return goes_on(left) ? left : right;
 }
 
-/// Advances distance_m along lanes, choosing among successors with equal probability. If a lane has no successor but
-/// the route continues, first changes to the nearest lane that has a successor. Stops where routes end.
+/// Returns the point distance_m ahead on a random route. Each successor of a lane is chosen with equal probability. At
+/// the end of a lane without successors, the route continues on the nearest lane beside it that has a successor. The
+/// result is never beyond the point where routes end.
 PICTURA_HD inline RoutePoint advance_along_lanes(const MapView& map, RoutePoint at, float distance_m,
                                                  RandomStream* random_inout) {
   constexpr int kMaxLanesWalked = 64;  // a safety bound, for many lanes shorter than a metre
@@ -59,7 +62,7 @@ PICTURA_HD inline RoutePoint advance_along_lanes(const MapView& map, RoutePoint 
   return {at.lane, map.lanes[at.lane].length_m};
 }
 
-/// Returns the next waypoint of a route: possibly after a lane change, then after the gap.
+/// Returns the next waypoint of a route: a lane change with probability kLaneChangeChance, then a random gap ahead.
 PICTURA_HD inline RoutePoint next_waypoint(const MapView& map, RoutePoint at, RandomStream* random_inout) {
   const float gap_m = random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m);
   const float change = random_inout->uniform();
@@ -67,7 +70,8 @@ PICTURA_HD inline RoutePoint next_waypoint(const MapView& map, RoutePoint at, Ra
   return advance_along_lanes(map, at, gap_m, random_inout);
 }
 
-/// Whether the way from `from` to `to` comes within radius_m of `goal`, on the level of `goal`.
+/// Whether the straight line from `from` to `to` comes within radius_m of `goal` in plan. The height of `to` must
+/// differ by less than kWaypointLevel_m from that of `goal`.
 PICTURA_HD inline bool passes(Vec3 from, Vec3 to, Vec3 goal, float radius_m) {
   if (fabsf(to.z - goal.z) >= kWaypointLevel_m) return false;
   const Vec2 way = to.xy() - from.xy();

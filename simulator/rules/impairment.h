@@ -1,6 +1,6 @@
-// Other agents: the agents of an episode that are impaired or driven by other policies, the times at which impairments
-// are active, and their effects. All of it follows from counter-based numbers, so that it is part of neither state nor
-// observations.
+// Agents that are impaired or driven by other policies: their random choice for each episode, the times at which
+// impairments are active, and their effects. All of this is computed from counter-based random numbers, so the state
+// does not store it.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -10,8 +10,8 @@
 
 namespace pictura {
 
-/// Draws an agent's kind in an episode: 0 for an agent that learns, else one more than the index of a share in
-/// OtherShares.
+/// Draws an agent's driver kind for an episode: 0 for an agent that learns, else 1 + the index of a share in the order
+/// of OtherShares.
 PICTURA_HD inline int draw_driver_kind(const OtherShares& shares, uint64_t seed, uint32_t world, uint32_t agent,
                                        uint32_t episode) {
   if (shares.sum() <= 0.0f) return 0;
@@ -31,8 +31,8 @@ PICTURA_HD inline int draw_driver_kind(const OtherShares& shares, uint64_t seed,
   return 0;
 }
 
-/// Impairment and driver of a result of draw_driver_kind(). The driver is 0 for the simulator's main policy, and 1 + i
-/// for policy i.
+/// Convert a result of draw_driver_kind() to the impairment and to the driver of the agent. The driver is 0 for the
+/// learning policy, and 1 + i for policy i of OtherShares::policies.
 PICTURA_HD constexpr Impairment impairment_of(int other) {
   return other > kNumImpairments ? Impairment::none : static_cast<Impairment>(other);
 }
@@ -44,9 +44,9 @@ PICTURA_HD inline Impairment draw_impairment(const OtherShares& shares, uint64_t
   return impairment_of(draw_driver_kind(shares, seed, world, agent, episode));
 }
 
-/// Whether an agent's impairment is active in its observation after `step` steps of the episode, and in its next
-/// action. Inattention is always active; the others are active in one spell of U(1, 5) s in every 10 s, at a random
-/// time within them.
+/// Whether an agent's impairment is active after `step` steps of the episode, in its observation and its next action.
+/// `inattentive` is always active. The other impairments are active once in every period of 10 s, for U(1, 5) s from a
+/// random time on.
 PICTURA_HD inline bool is_active_at(Impairment impairment, int step, float dt_s, uint64_t seed, uint32_t world,
                                     uint32_t agent, uint32_t episode) {
   constexpr float kPeriod_s = 10.0f, kMinSpell_s = 1.0f, kMaxSpell_s = 5.0f;
@@ -63,13 +63,14 @@ PICTURA_HD inline bool is_active_at(Impairment impairment, int step, float dt_s,
   return since_begin >= 0 && since_begin < spell_steps;
 }
 
-/// Objects that an active impairment hides from the views of an agent.
+/// Returns the objects that an active impairment hides from an agent's images and observations.
 PICTURA_HD constexpr Hides hidden_by(Impairment shown) {
   if (shown == Impairment::blind) return kHidesAgents;
   return shown == Impairment::inattentive ? kHidesLights : kHidesNothing;
 }
 
-/// Longitudinal jerk of a phantom braking, against the motion. An agent at rest stays at rest.
+/// Returns the longitudinal jerk of phantom braking (braking for no reason). It is opposite to the motion; an agent at
+/// rest stays at rest.
 PICTURA_HD inline float braking_jerk_mps3(const Motion& motion) {
   const float hardest_mps3 = controls_of_action(0).jerk_long_mps3;
   const float forwards = motion.speed_mps != 0.0f ? motion.speed_mps : motion.accel_long_mps2;

@@ -1,6 +1,6 @@
-// Capabilities and sizes of each class of agent; docs/explanation/simulator.md contains this table. Vehicle limits are
-// those of the jerk model (reference implementation of the paper's dynamics); limits of cyclists and pedestrians are
-// our own.
+// Limits of the dynamics and sizes of each class of agents, listed in docs/explanation/simulator.md. Limits of vehicles
+// are those of the reference implementation of the paper's dynamics; limits of cyclists and pedestrians are this
+// project's choice.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -11,7 +11,7 @@ namespace pictura {
 
 struct ClassLimits {
   float min_speed_mps, max_speed_mps;
-  float min_accel_mps2, max_accel_mps2;  // longitudinal; the maximum is scaled by the acceleration multiplier
+  float min_accel_mps2, max_accel_mps2;  // longitudinal; Conditioning::acceleration multiplies the maximum
   float max_lat_accel_mps2;
   float max_steer_rad, max_steer_rate_radps;
   float min_length_m, max_length_m, min_width_m, max_width_m, height_m;
@@ -25,12 +25,12 @@ PICTURA_HD constexpr ClassLimits class_limits(AgentClass agent_class) {
   }
 }
 
-/// Maximum speed of all classes. Recorded traffic may be faster and larger: rules read the limits of the map
-/// (MapView::max_speed_mps, max_box_radius_m).
+/// Maximum speed of any class. Recorded traffic may be faster and larger, so the rules use MapView::max_speed_mps and
+/// MapView::max_box_radius_m instead of these constants.
 constexpr float kMaxSpeed_mps = 20.0f;
 /// Maximum half-diagonal of a box of any class.
 constexpr float kMaxBoxRadius_m = 3.2f;
-/// Maximum duration of a step: contact with barriers is tested only at its end.
+/// Maximum duration of a step. It is short, because contact with barriers is tested only at the end of a step.
 constexpr float kMaxStep_s = 0.1f;
 
 PICTURA_HD constexpr bool keeps_bounds(const ClassLimits& limits) {
@@ -43,8 +43,8 @@ static_assert(keeps_bounds(class_limits(AgentClass::vehicle)) && keeps_bounds(cl
 
 constexpr float kWheelbasePerLength = 0.6f;
 
-/// Distance from the reference point to the box's centre. The rear axle lies half a wheelbase behind the centre; the
-/// reference point of pedestrians is their centre.
+/// Returns the distance from an agent's reference point forward to its box's centre. The reference point of vehicles
+/// and cyclists is the rear axle, half a wheelbase behind the centre; that of pedestrians is the centre.
 PICTURA_HD constexpr float reference_to_center(AgentClass agent_class, float length_m) {
   return agent_class == AgentClass::pedestrian ? 0.0f : 0.5f * kWheelbasePerLength * length_m;
 }

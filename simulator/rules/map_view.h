@@ -1,7 +1,7 @@
-// Map data that rules read: flat arrays and cell lists that both devices can hold. simulator/map_rules.h makes them
-// from a RoadMap. There are two kinds of cell lists. `*_cells` list for each cell all items within reach of any point
-// in the cell, so that a query at a point reads one cell. `near_*` list for each cell the items that may be observed
-// from it, nearest to the cell's centre first.
+// Map data that rules read: flat arrays and cell lists (grids with a list of items for each cell), in host or device
+// memory. simulator/map_rules.h makes them from a RoadMap. There are two kinds of cell lists. A list of `*_cells`
+// contains all items within reach of any point in the cell, so that a query at a point reads one cell. A list of
+// `near_*` contains the items that an agent in the cell may observe, nearest to the cell's centre first.
 #pragma once
 
 #include "pictura/common/cells_around.h"
@@ -12,11 +12,11 @@
 
 namespace pictura {
 
-/// Maximum distance from a lane's centre line at which an agent is still on the lane.
+/// An agent is on a lane only within this distance of the lane's centre line.
 constexpr float kLaneReach_m = 5.0f;
-/// Minimum height difference of different levels.
+/// Two objects are on the same level if their heights differ by less than this.
 constexpr float kLevel_m = 2.0f;
-/// Range within which a stop line can be violated.
+/// An agent can violate a stop line only within this distance of the line's middle.
 constexpr float kStopLineReach_m = 10.0f;
 
 /// A straight piece of a drivable lane's centre line, in the direction of travel.
@@ -30,22 +30,22 @@ struct LaneSegment {
   float half_width_m = 0;
   float s_m = 0;          // arc length at a
   int32_t lane = 0;       // index into MapView::lanes
-  int32_t is_driven = 0;  // agents can be on its lane; otherwise it is only part of the drivable surface (parking)
+  int32_t is_driven = 0;  // 1: agents can be on its lane; 0: only part of the drivable surface (parking)
 };
 
-/// Value of MapLane::route_end_m where routes continue after the lane.
+/// Value of MapLane::route_end_m for lanes after which routes continue.
 constexpr float kRouteGoesOn_m = 1e30f;
 
 struct MapLane {
   int32_t first_segment = 0, num_segments = 0;
-  // Range of MapView::successors. The first num_successors are the lanes on which endless routes start, or on open maps
-  // the driving and ramp lanes; the other successors follow.
+  // Range of MapView::successors. The first num_successors lanes are those on which a route may continue: lanes on
+  // which routes can continue without end or, on open maps, driving and ramp lanes. The other successors follow.
   int32_t first_successor = 0, num_successors = 0, num_all_successors = 0;
-  int32_t left = -1, right = -1;  // neighbours of the same kind as the first successors
+  int32_t left = -1, right = -1;  // neighbouring lanes on which a route may continue, or -1
   float length_m = 0;
   float speed_limit_mps = 0;
-  int32_t light = -1;                  // the stop line that controls the lane
-  float route_end_m = kRouteGoesOn_m;  // on open maps where routes end: arc length of the last waypoint
+  int32_t light = -1;                  // index of the stop line that controls the lane, or -1
+  float route_end_m = kRouteGoesOn_m;  // if routes end on this lane: arc length of their end
 };
 
 /// Place where agents leave an open map: a line across the end of a lane.
@@ -53,22 +53,22 @@ struct Exit {
   Vec3 middle_m;
   Vec2 direction;  // direction of traffic, unit vector
   float half_width_m = 0;
-  float slope = 0;  // slope of the lane there, rise per metre
+  float slope = 0;  // slope of the lane at its end, rise per metre
 };
 
-/// A lane at whose start agents enter an open map. Entries with the same `turn` form a cluster: per step, one agent
-/// enters through one of them.
+/// A lane at whose start agents enter an open map. Entries that are close to each other have the same `turn`: in each
+/// step, only one agent can enter through them.
 struct Entry {
   int32_t lane = 0, turn = 0;
 };
 
-/// A piece of the outline of the drivable surface, or the lower edge of a wall.
+/// A straight piece of the drivable surface's outline, or the lower edge of a wall.
 struct Barrier {
   Vec2 a_m, b_m;
   float z_m = 0;  // at its middle
 };
 
-/// A straight, directed piece of a way for pedestrians. Pieces 2k and 2k + 1 are opposite directions of one way.
+/// A straight, directed piece of a walkway. Pieces 2k and 2k + 1 are the two directions of one line.
 struct WalkPiece {
   Vec3 a_m;
   Vec2 direction;  // unit vector
@@ -76,15 +76,15 @@ struct WalkPiece {
   float slope = 0;  // rise per metre
   float heading_rad = 0;
   int32_t to_node = 0;  // node at its end
-  int32_t next = 0;     // the only piece that follows, which at a dead end is the way back; -1: several
+  int32_t next = 0;     // the following piece (at a dead end, the way back); -1: there are several
 };
-/// Height of a LaneSegment or a WalkPiece at along_m from its start.
+/// Returns the height of a LaneSegment or a WalkPiece at distance along_m from its start.
 template <typename Piece>
 PICTURA_HD float height_on(const Piece& piece, float along_m) {
   return piece.a_m.z + piece.slope * along_m;
 }
 
-/// Maximum distance from a walkway at which a pedestrian stands at its height.
+/// Within this distance of a walkway, a pedestrian stands at the walkway's height.
 constexpr float kWalkReach_m = 5.0f;
 
 struct StopLine {
@@ -92,19 +92,20 @@ struct StopLine {
   Vec3 middle_m;
   Vec2 direction;  // direction of the controlled traffic
   float half_length_m = 0;
-  float beyond_left_m = 0, beyond_right_m = 0;  // from its ends to the far side of the lanes of oncoming traffic
+  float beyond_left_m = 0, beyond_right_m = 0;  // distances from its ends to the far side of adjacent oncoming lanes
   int32_t junction = -1, phase = 0, num_phases = 1;
 };
 
-/// A place for a parked car: on the spot, or outside a kerb that runs through it.
+/// A place for a parked car. Either the car's centre is at position_m, or position_m is on a kerb and the car parks
+/// outside this kerb.
 struct ParkingSpot {
   Vec3 position_m;
   float heading_rad = 0;
-  Vec2 outward;  // unit vector away from the road; null on parking lanes and spaces
+  Vec2 outward;  // at a kerb: unit vector away from the road; elsewhere 0
 };
 
-/// A piece of a lane, boundary or wall as the policy observes it, with the length that MapOptions gives. Eight floats,
-/// which a host reads in one load and a device in two.
+/// A piece of a lane, boundary or wall that the policy observes. MapOptions::observed_span_m sets its maximum length.
+/// It has eight floats, which a CPU loads with one instruction and a GPU with two.
 struct alignas(16) ObservedPiece {
   Vec3 middle_m;  // on the ground
   float half_length_m = 0;
@@ -114,7 +115,7 @@ struct alignas(16) ObservedPiece {
 };
 static_assert(sizeof(ObservedPiece) == 8 * sizeof(float));
 
-/// A road user of the scene from which a map was recorded.
+/// A road user of the recorded scene of a map.
 struct RecordedAgent {
   int32_t agent_class = 0;  // AgentClass
   float length_m = 0, width_m = 0, height_m = 0;
@@ -136,7 +137,8 @@ struct MapView {
   Span<const Barrier> edges, walls;
   Span<const StopLine> stop_lines;
   Span<const int32_t> spawn_lanes;
-  Span<const float> spawn_end_m;  // [spawn_lanes] running sum of lengths; on open maps, of parts with enough way ahead
+  Span<const float> spawn_end_m;  // [spawn_lanes] running sum of lengths; on open maps, only of parts far from the ends
+                                  // of routes
   Span<const Exit> exits;
   Span<const Entry> entries;
   GridView exit_cells;
@@ -146,30 +148,31 @@ struct MapView {
   Span<const int32_t> walk_leaving;
   Span<const ParkingSpot> parking_spots;
   Span<const ObservedPiece> lane_pieces, boundary_pieces, wall_pieces;
-  Span<const Vec2> lane_middles, boundary_middles, wall_middles;  // copies of the pieces' middle_m (x, y)
+  Span<const Vec2> lane_middles, boundary_middles, wall_middles;  // x, y of the pieces' middle_m
   GridView segment_cells, edge_cells, wall_cells, stop_line_cells;
-  GridView walk_cells;                                                // cells of pairs of walk_pieces
-  GridView near_lane_pieces, near_boundary_pieces, near_wall_pieces;  // per cell and sector
+  GridView walk_cells;                                                // item k is the pair of walk_pieces 2k, 2k + 1
+  GridView near_lane_pieces, near_boundary_pieces, near_wall_pieces;  // lists per cell and heading sector
   GridView near_stop_lines;
   Span<const RecordedAgent> recorded_agents;  // in the order of the worlds' agents; empty without a record
   Span<const RecordedState> recorded_states;  // [recorded_agents, recorded_steps]
-  Span<const SideEdge> side_edges;            // edges of maps with a record, for road_side()
+  Span<const SideEdge> side_edges;            // only on maps with a record, for road_side()
   GridView side_cells;
-  Span<const LightState> recorded_lights;  // [stop_lines, recorded_steps]; if empty, lights follow plans
-  int32_t recorded_steps = 0;              // from the step at which episodes start
-  // Above 0: index of the first recorded_agents that are boxes of worlds, but none of their agents.
+  Span<const LightState> recorded_lights;  // [stop_lines, recorded_steps]; if empty, lights follow LightPlans
+  int32_t recorded_steps = 0;              // number of recorded steps from the start of episodes on
+  // If above 0, recorded_agents from this index on are replayed tracks: boxes like parked cars, not agents.
   int32_t first_replayed = 0;
   float max_box_radius_m = 0, max_speed_mps = 0;  // maximum half-diagonal of boxes, and maximum speed
-  uint8_t is_open = 0;                            // whether roads end, so that agents leave and enter
+  uint8_t is_open = 0;                            // 1: roads end, so that agents leave and enter
 };
 
-/// Whether the map comes from a recorded scene, whose road users are all agents of its worlds.
+/// Whether the map comes from a recorded scene. Its worlds then contain the scene's road users.
 PICTURA_HD inline bool has_record(const MapView& map) { return !map.recorded_agents.empty(); }
 
-/// Whether some road users of the scene only follow their records: they are boxes like parked cars, not agents.
+/// Whether some road users of the scene are replayed tracks: they follow their records as boxes like parked cars, not
+/// as agents.
 PICTURA_HD inline bool has_replayed_tracks(const MapView& map) { return map.first_replayed > 0; }
 
-/// Calls visit(&span) for every array of the view, so that arrays can be copied to another memory.
+/// Calls visit(&span) for every array of the view, for instance to copy the arrays to device memory.
 template <typename Visit>
 PICTURA_HD void visit_arrays(MapView* view, Visit&& visit) {
   visit(&view->segments);
@@ -212,22 +215,22 @@ PICTURA_HD inline Span<const int32_t> list_of(const GridView& lists, size_t inde
   return lists.items.subspan(begin, lists.begin[index + 1] - begin);
 }
 
-/// Returns the list of the cell that contains p; points outside belong to the nearest cell.
+/// Returns the list of the cell that contains p. Points outside the grid belong to the nearest cell.
 PICTURA_HD inline Span<const int32_t> items_at(const GridView& cells, Vec2 p) {
   return list_of(cells, static_cast<size_t>(cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x)));
 }
 
-/// Number of heading sectors. Visible pieces depend on the heading, so pieces are listed per cell and per eighth of a
-/// turn.
+/// Number of heading sectors. Because the visible pieces depend on the observer's heading, there is a list of pieces
+/// for each cell and each sector of 45 degrees.
 constexpr int kSectors = 8;
 
-/// Cell and sector of an observer; all near_* lists have the same cells.
+/// Cell and heading sector of an observer. All near_* lists have the same cells.
 struct NearPlace {
   size_t cell = 0, sector = 0;
   PICTURA_HD size_t cell_and_sector() const { return cell * kSectors + sector; }
 };
 
-/// Returns the cell that contains p and the sector that contains the heading, in [-pi, pi].
+/// Returns the cell that contains p and the sector that contains the heading. heading_rad must be in [-pi, pi].
 PICTURA_HD inline NearPlace near_place(const MapView& map, Vec2 p, float heading_rad) {
   const GridView& cells = map.near_lane_pieces;
   const int sector = clamp(static_cast<int>((heading_rad + kPi) * (kSectors / kTwoPi)), 0, kSectors - 1);

@@ -1,5 +1,5 @@
-// Observations of an agent in its own frame (ego_frame.h), scaled to about [-1, 1]. docs/reference/observation.md
-// tabulates the slots.
+// Observations of an agent in its own frame (ego_frame.h), scaled to about [-1, 1]. docs/reference/observation.md lists
+// all observed numbers.
 #pragma once
 
 #include "pictura/common/portable/async_copy.h"
@@ -29,9 +29,9 @@ PICTURA_HD inline void observe_ego(const WorldView& world, int slot, float* out)
   out[8] = auxiliary && agents.lane[slot] >= 0 ? cos_of(agents.lane_angle_rad[slot]) : 0.0f;
 }
 
-/// Observes the conditioning, scaled by the paper's training ranges regardless of the run's ranges, so that a
-/// coefficient has the same observed value in all runs; fixed coefficients give 0. Values below the range, as
-/// pedestrians have, are distinguished down to -2.
+/// Writes the observed conditioning. It is scaled by conditioning_scale, the paper's training ranges, and not by the
+/// ranges of the run, so that equal coefficients are observed equally in all runs. Coefficients that the paper does not
+/// vary are observed as 0. Values below the range, which pedestrians have, are clamped to -2.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* out, const ThreadGroup& group = {}) {
   for (int i = group.rank(); i < kNumConditioning; i += group.size()) {
@@ -43,7 +43,7 @@ PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* ou
   }
 }
 
-/// Observes the active waypoint and the waypoints after it; beyond the end of the chain, the last waypoint is repeated.
+/// Writes the active waypoint and the waypoints after it. The chain's last waypoint is repeated to fill all rows.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFrame& frame, float* out,
                                   const ThreadGroup& group = {}) {
@@ -56,15 +56,16 @@ PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFra
   }
 }
 
-/// Finds the partners of `agent` by distance from its reference point to their box centres. The nearest cells are
-/// searched if they contain enough boxes, else all cells in range; in a crowd, intermediate ranges are tried first.
+/// Finds the partners of `agent`: the nearest other boxes by distance from the agent's reference point to their
+/// centres. Searches the nearest cells first. If these contain too few boxes, it searches all cells in range; in a
+/// world with many boxes, it doubles the range instead.
 template <typename ThreadGroup>
 PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) {
   using Nearest = typename ThreadGroup::template Nearest<kMaxPartners>;
   const GridView& cells = world.box_cells;
-  constexpr int32_t kFew = 256;  // up to this number, reading all boxes is faster than selecting the near ones
+  constexpr int32_t kFew = 256;  // up to this number, reading all boxes is faster than selecting near boxes
   const bool is_crowd = cells.begin[cells.begin.size() - 1] > kFew;
-  // A cell may be wider than the visible range: a device may have a single cell.
+  // A cell may be wider than the visible range: on a GPU, a world may have a single cell.
   for (float reach = min_of(cells.cell_m, kPartnerRange_m);;
        reach = is_crowd ? min_of(2.0f * reach, kPartnerRange_m) : kPartnerRange_m) {
     const CellRows range = cells_around(cells, origin, reach);
@@ -75,8 +76,8 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
     if (is_near && found < 2 * kMaxPartners) continue;
     Nearest nearest;
     if constexpr (ThreadGroup::kSize == 1) {
-      // Rows of cells are contiguous. Boxes outside the range's columns are read too if that costs less than a loop per
-      // row.
+      // Boxes of consecutive rows of cells are contiguous. If there are few, one loop reads all rows, including boxes
+      // outside the range's columns.
       const bool at_once = range.end(cells, range.y1) - range.begin(cells, range.y0) <= kFew;
       for (int y = range.y0; y <= range.y1; ++y) {
         const int32_t begin = range.begin(cells, y);
@@ -110,7 +111,7 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
   }
 }
 
-/// Variant of nearest_partners() for a sequence of num_boxes boxes: box_at(i) counts if is_present(i).
+/// Variant of nearest_partners() that searches the boxes box_at(i), i < num_boxes, for which is_present(i) holds.
 template <typename ThreadGroup, typename BoxAt, typename IsPresent>
 PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsPresent& is_present, Vec2 origin,
                               const ThreadGroup& group) {
@@ -126,7 +127,7 @@ PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsPresen
   return nearest;
 }
 
-/// Speed of a world's box as other agents observe it: 0 for parked cars.
+/// Returns the speed of a box that other agents observe: 0 for parked cars.
 PICTURA_HD inline float observed_speed_mps(const WorldView& world, int box) {
   if (!world.options.auxiliary_observations) return 0.0f;
   if (box < world.num_agents) return world.agents.speed_mps[world.first_slot + box];
@@ -147,15 +148,15 @@ PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFram
   return count;
 }
 
-/// Pieces of a map of one kind, and the items that are visible from the agent's place.
+/// All pieces of one kind of a map, and the indices of those that may be visible from the agent's place.
 struct PieceList {
   Span<const ObservedPiece> pieces;
   Span<const Vec2> middles;
   Span<const int32_t> items;
 };
 
-/// Observes lanes, boundaries or walls: of the pieces listed for the ego's cell, the first `capacity` whose middles are
-/// in sight.
+/// Writes the observed lanes, boundaries or walls: the first `capacity` pieces of near.items whose middles are in
+/// sight.
 PICTURA_HD inline int observe_pieces(const PieceList& near, const EgoFrame& frame, int capacity, float* out) {
   constexpr int kMaxPieces = max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls);
   int32_t found[kMaxPieces + kFoundBeyond];
@@ -164,14 +165,15 @@ PICTURA_HD inline int observe_pieces(const PieceList& near, const EgoFrame& fram
   return count;
 }
 
-/// Code of a light: red 1, yellow 0.5, green -1, else 0. Computed in integers, so that compilers need no branches: the
-/// lights around an agent differ.
+/// Returns the observed code of a light: red 1, yellow 0.5, green -1, else 0. Integer arithmetic avoids branches, which
+/// would be hard to predict, because the lights around an agent differ.
 PICTURA_HD constexpr float light_code(LightState state) {
   const int halves = 2 * (state == LightState::red) + (state == LightState::yellow) - 2 * (state == LightState::green);
   return 0.5f * static_cast<float>(halves);
 }
 
-/// Observes the nearest stop lines: left and right end, height, state, and whether the line controls the ego's lane.
+/// Writes the nearest stop lines: left and right end, height, light state, and whether the line controls the ego's
+/// lane.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlace& place, const EgoFrame& frame,
                                 float* rows, const ThreadGroup& group = {}) {
@@ -205,21 +207,22 @@ PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlac
   return count;
 }
 
-/// Whether the agent's observation is used: the agent drives or may start to, or this is its last observation.
+/// Whether the agent's observation can be used: the agent takes actions, or this is the last observation of its episode
+/// or life.
 PICTURA_HD inline bool observes(const WorldView& world, int agent) {
   return takes_actions(world, agent) || has_left(world, agent) ||
          (world.agents.events[world.first_slot + agent] & kInfractions) != 0;
 }
 
-/// Whether the agent's set may contain entities, given the kinds that are hidden_from() the agent.
+/// Whether the agent's entity set may be nonempty. `hidden` is hidden_from() the agent.
 PICTURA_HD inline bool observes_set(const WorldView& world, int agent, EntitySet set, Hides hidden) {
   const bool is_hidden =
       (set == EntitySet::partners && hidden == kHidesAgents) || (set == EntitySet::controls && hidden == kHidesLights);
   return !is_hidden && observes(world, agent);
 }
 
-/// Observes everything except sets into a row of `out`: all zeros for absent agents and for agents that halted in an
-/// earlier step.
+/// Writes the own arrays (all except entity sets) of an agent into a row of `out`. They are zeros for absent agents and
+/// for agents that halted in an earlier step.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_own(const WorldView& world, int agent, int row, const ObservationView& out,
                             const ThreadGroup& group = {}) {
@@ -239,12 +242,12 @@ PICTURA_HD void observe_own(const WorldView& world, int agent, int row, const Ob
   for (int i = group.rank(); i < kNumWaypoints * kWaypointFeatures; i += group.size()) waypoints[i] = 0.0f;
 }
 
-/// Number of sets that are written: all, or all except walls.
+/// Returns the number of entity sets that are written: all, or all except walls.
 PICTURA_HD inline int num_observed_sets(const ObservationView& out) {
   return out.walls.empty() ? static_cast<int>(EntitySet::walls) : kNumEntitySets;
 }
 
-/// Destination of a set of one observation.
+/// Destination of one entity set of one observation.
 struct SetRows {
   float* rows = nullptr;
   int features = 0, capacity = 0;
@@ -283,7 +286,7 @@ PICTURA_HD inline PieceList pieces_near(const MapView& map, const NearPlace& pla
   }
 }
 
-/// Prefetches the list that pieces_near() returns, because the lists of all places exceed a core's caches.
+/// Prefetches the list that pieces_near() returns, because all lists together do not fit into a core's caches.
 PICTURA_HD inline void prefetch_list_near(const MapView& map, const NearPlace& place, EntitySet set) {
   constexpr int kLines = 5, kLineBytes = 64;  // enough for most lists
   if (set == EntitySet::partners || set == EntitySet::controls) return;
@@ -291,10 +294,10 @@ PICTURA_HD inline void prefetch_list_near(const MapView& map, const NearPlace& p
   for (int line = 0; line < kLines; ++line) prefetch(items, line * kLineBytes);
 }
 
-/// Observation that each step writes for all present agents, over the observation of the previous step.
+/// Policy class for observe_set() in steps: rows overwrite those of the previous step.
 struct StepObservation {
-  /// Number of rows that may contain values other than zero. Callers have access to the memory and may have written any
-  /// values.
+  /// Returns the number of rows that may contain values other than zero. The count is clamped, because callers have
+  /// access to the memory and may have changed it.
   PICTURA_HD static int num_filled(const SetRows& set) { return min_of(max_of(*set.count, 0), set.capacity); }
   template <typename ThreadGroup>
   PICTURA_HD static int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* rows,
@@ -303,8 +306,8 @@ struct StepObservation {
   }
 };
 
-/// Observes one entity set: empty for absent agents, for agents that halted in an earlier step, and for agents from
-/// which the set is hidden.
+/// Writes one entity set. It is empty for absent agents, for agents that halted in an earlier step, and for agents from
+/// which it is hidden.
 template <typename Observation>
 PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& place, EntitySet set,
                             const SetRows& out, const Observation& observation) {
@@ -325,13 +328,13 @@ PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& 
   *out.count = count;
 }
 
-/// Writes the whole observations of agents [begin, end) of a world, including sets if `entity_sets`. Sets are written
-/// one kind at a time, so that the data of a kind stays in the cache.
+/// Writes the observations of agents [begin, end) of a world, including entity sets if `entity_sets`. For a block of
+/// agents, it writes one kind of set after another, so that the map data of a kind stay in the cache.
 PICTURA_HD inline void observe(const WorldView& world, int begin, int end, bool entity_sets,
                                const ObservationView& out) {
   for (int agent = begin; agent < end; ++agent) observe_own(world, agent, world.first_slot + agent, out);
   if (!entity_sets) return;
-  constexpr int kBlock = 128, kAhead = 2;  // number of agents whose places are kept, and distance of prefetching
+  constexpr int kBlock = 128, kAhead = 2;  // agents per block, and number of agents to prefetch ahead
   NearPlace places[kBlock];
   for (int first = begin; first < end; first += kBlock) {
     const int count = min_of(kBlock, end - first);

@@ -1,4 +1,4 @@
-// Hypothetical observations: a world's observation without some boxes and with additional boxes as partners.
+// Hypothetical observations: those that an agent would have if some boxes were hidden and others were inserted.
 #pragma once
 
 #include "pictura/simulator/observation_query.h"
@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// Observation of one query, in a row that may contain any values before.
+/// Policy class for observe_set() in queries: the destination row may contain any previous values.
 class QueriedObservation {
  public:
   PICTURA_HD QueriedObservation(const ObservationQueries& asked, const ObservationQuery& query)
@@ -49,8 +49,8 @@ class QueriedObservation {
     return false;
   }
 
-  /// Variant of pictura::nearest_partners() for all boxes except the hidden ones, and for the inserted boxes, whose
-  /// items follow the world's items.
+  /// Variant of pictura::nearest_partners() that excludes hidden boxes and includes inserted boxes. Item num_boxes + i
+  /// is inserted box i.
   template <typename ThreadGroup>
   PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) const {
     const auto box_at = [&](int item) -> const AgentBox& {
@@ -67,13 +67,13 @@ class QueriedObservation {
   bool leaves_gaps_ = false;
 };
 
-/// Clears the counts of sets that simulators of this configuration do not write.
+/// Clears the counts of entity sets that are not written.
 PICTURA_HD inline void clear_other_counts(const ObservationView& out, int row) {
   int32_t* counts = out.set_counts.data() + static_cast<size_t>(row) * kNumEntitySets;
   for (int set = num_observed_sets(out); set < kNumEntitySets; ++set) counts[set] = 0;
 }
 
-/// Writes the whole observation of a query, which must be without fault, including sets if `entity_sets`.
+/// Writes the observation of query i, which must be without error, including entity sets if `entity_sets`.
 PICTURA_HD inline void answer_query(const WorldView& world, const ObservationQueries& asked, int i, bool entity_sets) {
   const ObservationQuery& query = asked.queries[i];
   const int agent = query.slot - world.first_slot;
@@ -88,7 +88,8 @@ PICTURA_HD inline void answer_query(const WorldView& world, const ObservationQue
   clear_other_counts(asked.out, i);
 }
 
-/// Fault of a query, in one word that a host reads atomically: its kind, the query, and the value.
+/// Kind of error of a query. query_fault() encodes the kind, the query and the wrong value in one 64-bit word, which a
+/// host can read atomically.
 enum class QueryFault : int32_t {
   slot,
   hidden_begin,
@@ -99,7 +100,7 @@ enum class QueryFault : int32_t {
   inserted_box
 };
 constexpr int64_t kNoQueryFault = -1;
-constexpr int kMaxQueries = 1 << 24;  // per call
+constexpr int kMaxQueries = 1 << 24;  // maximum number of queries per call
 PICTURA_HD constexpr int64_t query_fault(QueryFault what, int32_t query, int32_t value) {
   return (int64_t{static_cast<int32_t>(what)} << 56) | (int64_t{query} << 32) | static_cast<uint32_t>(value);
 }
@@ -111,7 +112,7 @@ PICTURA_HD inline bool is_valid(const InsertedBox& one) {
          is_finite(box.length_m) && is_finite(box.width_m) && is_finite(box.height_m) && is_finite(one.speed_mps);
 }
 
-/// Returns the fault of query i. world_of(slot) must return the WorldView of the slot's world.
+/// Returns the error of query i, or kNoQueryFault. world_of(slot) must return the WorldView of the slot's world.
 template <typename WorldOf>
 PICTURA_HD int64_t find_query_fault(const ObservationQueries& asked, int i, int num_slots, const WorldOf& world_of) {
   const ObservationQuery& query = asked.queries[i];

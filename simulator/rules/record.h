@@ -1,4 +1,4 @@
-// Agents that follow the record of their world's scene: their identity, their state at each step, and their end.
+// Agents that follow the records of a recorded scene: their size, their state at each step, and their goal.
 #pragma once
 
 #include "pictura/simulator/rules/walk.h"
@@ -6,10 +6,12 @@
 
 namespace pictura {
 
-/// Values of `goal_chains`: a recorded agent has one goal, the end of its record, and passes it once.
+/// Values of the field goal_chains on maps with a record. An agent has one goal, the end of its record: it is
+/// kRecordedGoal until the agent passes the goal, then kRecordedGoalReached.
 constexpr int32_t kRecordedGoal = 1, kRecordedGoalReached = 2;
 
-/// Returns the state of an agent `step` steps after its episode's start. After the record's end it stands still.
+/// Returns the recorded state of an agent `step` steps after its episode's start. After the record's end, it is the
+/// last state with speed 0.
 PICTURA_HD inline RecordedState recorded_state(const MapView& map, int agent, int step) {
   const int last = map.recorded_steps - 1;
   RecordedState state = map.recorded_states[static_cast<size_t>(agent) * static_cast<size_t>(map.recorded_steps) +
@@ -26,7 +28,7 @@ PICTURA_HD inline void store_recorded_size(const WorldView& world, int agent) {
   world.agents.height_m[slot] = recorded.height_m;
 }
 
-/// Whether an agent walks: pedestrians do; all other agents drive.
+/// Whether an agent is a pedestrian.
 PICTURA_HD inline bool walks(const WorldView& world, int agent) {
   return world.agents.agent_class[world.first_slot + agent] == AgentClass::pedestrian;
 }
@@ -58,8 +60,9 @@ PICTURA_HD inline void leave(const WorldView& world, int agent) {
   remove_box(world, agent);
 }
 
-/// Places an agent at its recorded state `step` steps after the episode's start, or nowhere. An agent that was not
-/// recorded before appears at once, without collisions on the way. Only the first thread of the group writes.
+/// Places an agent at its recorded state `step` steps after the episode's start, or removes it if there is none. An
+/// agent that did not follow its record before is moved there without testing collisions on the way. Only the first
+/// thread of the group writes.
 template <typename ThreadGroup>
 PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
@@ -89,15 +92,15 @@ PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const
   world.boxes_before[agent] = goes_on ? before : world.boxes[agent];
 }
 
-/// State of the replayed track of box num_agents + i, `step` steps after its episode's start; absent if the map has
-/// fewer replayed tracks.
+/// Returns the state of replayed track i `step` steps after its episode's start. It is absent if the map has at most i
+/// replayed tracks.
 PICTURA_HD inline RecordedState replayed_state(const MapView& map, int i, int step) {
   const int agent = map.first_replayed + i;
   return agent < static_cast<int>(map.recorded_agents.size()) ? recorded_state(map, agent, step) : RecordedState{};
 }
 
-/// Places box num_agents + i, of a replayed track, at its recorded state `step` steps after the episode's start, or
-/// nowhere. Only the first thread of the group writes.
+/// Places box num_agents + i, that of replayed track i, at the track's state `step` steps after the episode's start, or
+/// removes it if there is none. Only the first thread of the group writes.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void replay_track(const WorldView& world, int i, int step, const ThreadGroup& group = {}) {
   const RecordedState at = replayed_state(world.map, i, step);
@@ -118,8 +121,8 @@ PICTURA_HD void replay_track(const WorldView& world, int i, int step, const Thre
   own = box;
 }
 
-/// Starts the agent's episode with its goal, the end of its record, as all of its waypoints; the last waypoint is
-/// active.
+/// Starts the episode of a recorded agent. All of its waypoints are its goal, the end of its record; the last waypoint
+/// is active.
 template <typename ThreadGroup>
 PICTURA_HD void begin_record(const WorldView& world, int agent, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;

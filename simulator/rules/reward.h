@@ -9,9 +9,9 @@
 
 namespace pictura {
 
-/// Events and state of a step that the reward depends on.
+/// Events and state of a step from which the reward is computed.
 struct StepFacts {
-  Motion motion;  // after the step, before an infraction halts the agent
+  Motion motion;  // after the step, but before an infraction halts the agent
   LaneFit fit;
   bool passed_waypoint = false;  // an intermediate waypoint
   bool passed_last_waypoint = false;

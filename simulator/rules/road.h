@@ -1,5 +1,5 @@
-// Place of an agent on the lane network: its lane, with hysteresis, its offset and angle, the height of the road, and
-// the test whether a point is on the drivable surface.
+// Position of an agent on the lane network: its lane, its offset from the lane, its angle to the lane and the height of
+// the road. Also the test whether a point is on the drivable surface.
 #pragma once
 
 #include "pictura/map/speed_limit.h"
@@ -8,12 +8,12 @@
 
 namespace pictura {
 
-/// Margin beyond half a lane's width that still belongs to its surface, to cover the seams between neighbouring lanes.
+/// Each lane's surface is widened by this margin on both sides, to cover gaps between neighbouring lanes.
 constexpr float kSeamTolerance_m = 0.1f;
-/// Observed offset of an agent without a lane (reference implementation); its angle is then a right angle.
+/// Offset of an agent that is on no lane, as in the paper's reference implementation. Its angle is then a right angle.
 constexpr float kNoLaneOffset_m = 4.0f;
 
-/// Relation of an agent to its lane.
+/// Position of an agent relative to its lane.
 struct LaneFit {
   int32_t lane = -1;
   float offset_m = kNoLaneOffset_m;  // positive to the left of the centre line
@@ -35,10 +35,10 @@ PICTURA_HD inline Foot foot_on(const LaneSegment& segment, Vec2 p) {
   return {along, length(from_a - segment.direction * along), cross(segment.direction, from_a)};
 }
 
-/// Returns the lane that fits position and heading best. The cost is the distance to its centre line (weight 0.7 per 4
-/// m) plus the angle to it (0.3 per half turn), plus 0.05 for leaving current_lane (-1: none), so that an agent between
-/// two lanes keeps its own. z_m is the agent's current height: only lanes on its level count. Without a lane within
-/// kLaneReach_m, the result has no lane and the same z_m.
+/// Returns the lane that fits position and heading best: the lane of minimum cost. The cost is the distance to the
+/// centre line (0.7 per 4 m), plus the angle to it (0.3 per half turn), plus 0.05 if the lane is not current_lane (-1:
+/// none), so that an agent between two lanes stays on its lane. Only lanes on the level of z_m, the agent's current
+/// height, are considered. If there is no lane within kLaneReach_m, the result has lane -1 and z_m is unchanged.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane,
                             const ThreadGroup& group = {}) {
@@ -72,8 +72,9 @@ PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading
   return group.of_lowest(best_score, best_item, best);
 }
 
-/// Whether a point lies on the drivable surface of its level: within half a width of a drivable lane's centre line. On
-/// maps with a record, whose lanes do not give the extent of the road: on the road's side of the nearest edge.
+/// Whether a point is on the drivable surface of its level: within half a lane's width of a drivable lane's centre
+/// line. On maps with a record, lanes do not give the extent of the road; there, the point must be on the road's side
+/// of the nearest edge.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const ThreadGroup& group = {}) {
   if (has_record(map)) return road_side(map.side_edges, map.side_cells, {p.x, p.y, z_m}, group).is_on_road;
@@ -89,13 +90,13 @@ PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const ThreadGr
   return group.any(is_on);
 }
 
-/// A place on a route: on a lane or, for pedestrians, on a piece of a walkway.
+/// A point of a route: a lane (for pedestrians, a piece of a walkway) and the arc length on it.
 struct RoutePoint {
   int32_t lane = -1;
   float s_m = 0;
 };
 
-/// A place on a lane's centre line.
+/// Position and heading of a point on a lane's centre line.
 struct LanePose {
   Vec3 position_m;
   float heading_rad = 0;

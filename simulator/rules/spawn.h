@@ -1,4 +1,4 @@
-// Start of an episode or a life: an agent's kind, its conditioning, its place, and its first goals.
+// Start of an episode or a life: an agent's class, size, conditioning, position and first goals.
 #pragma once
 
 #include "pictura/simulator/rules/box_chains.h"
@@ -10,11 +10,10 @@
 namespace pictura {
 
 constexpr int kSpawnTries = 32;
-constexpr float kSpawnClearance_m = 0.5f;  // between a new box and all other boxes
+constexpr float kSpawnClearance_m = 0.5f;  // minimum gap between a new box and all other boxes
 constexpr float kPedestrianGoalRadius_m = 0.5f;
 
-/// Draws one coefficient from U(low, high), or from a mixture of U(low, 1) and U(1, high) with equal probability. Equal
-/// bounds make it constant.
+/// Draws one coefficient from its ConditioningRange. Equal bounds make it constant.
 PICTURA_HD inline float draw_conditioning(const ConditioningRange& range, RandomStream* random_inout) {
   const float u = random_inout->uniform();
   if (!range.mixture || range.low == range.high) return range.low + (range.high - range.low) * u;
@@ -30,14 +29,14 @@ PICTURA_HD inline RandomStream agent_stream(const WorldView& world, int agent, u
                        .purpose = purpose});
 }
 
-/// Random stream of goal chain `chain` of the agent's life. Keys of different lives differ, because a life of n steps
-/// draws fewer than n chains.
+/// Returns the random stream for goal chain `chain` of the agent's current life. The key is life_step + chain.
+/// Different lives have different keys, because a life of n steps draws fewer than n chains.
 PICTURA_HD inline RandomStream goal_stream(const WorldView& world, int agent, int32_t chain) {
   const int32_t life_step = world.agents.life_step[world.first_slot + agent];
   return agent_stream(world, agent, static_cast<uint32_t>(life_step) + static_cast<uint32_t>(chain), Purpose::goals);
 }
 
-/// Draws the size of an agent of this class for the life that begins after `step` steps of the episode.
+/// Draws the size of an agent for the life that begins after `step` steps of the episode.
 PICTURA_HD inline BodySize draw_size(const WorldView& world, int agent, AgentClass agent_class, int step) {
   const ClassLimits limits = class_limits(agent_class);
   RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(step), Purpose::agent_size);
@@ -48,7 +47,8 @@ PICTURA_HD inline BodySize draw_size(const WorldView& world, int agent, AgentCla
   return size;
 }
 
-/// Draws size and conditioning of an agent whose class and life_step are set, or takes its size from the record.
+/// Draws the size and the conditioning of an agent whose class and life_step are set. On maps with a record, the size
+/// is the recorded size.
 PICTURA_HD inline void draw_body(const WorldView& world, int agent) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
@@ -66,14 +66,14 @@ PICTURA_HD inline void draw_body(const WorldView& world, int agent) {
     conditioning[i] = draw_conditioning(world.options.conditioning[i], &conditioning_random);
   }
   if (agent_class != AgentClass::pedestrian) return;
-  // Paper: for pedestrians, only the goal and collision terms are active, and the goal radius is capped.
+  // Paper: pedestrians get only the goal and collision terms of the reward, and their goal radius has an upper bound.
   for (int i = static_cast<int>(Conditioning::off_road); i < kNumRewardConditioning; ++i) conditioning[i] = 0.0f;
   float& goal_radius_m = conditioning[static_cast<int>(Conditioning::delta_goal_m)];
   goal_radius_m = min_of(goal_radius_m, kPedestrianGoalRadius_m);
 }
 
-/// Clears the agent's fields and draws its class, size and conditioning, or takes class and size from the record. The
-/// agent is absent until place_agent finds a place.
+/// Resets the agent's fields and draws its class, size and conditioning. On maps with a record, class and size are
+/// those of the record. The agent is absent until place_agent() places it.
 PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
@@ -98,12 +98,13 @@ PICTURA_HD inline AgentBox with_clearance(AgentBox box) {
   return box;
 }
 
-/// Maximum distance from the centre of a box with clearance to the centres of the map's boxes that may overlap it.
+/// Returns the maximum distance between the centre of `inflated`, a result of with_clearance(), and the centre of
+/// another box that overlaps it.
 PICTURA_HD inline float clearance_reach_m(const MapView& map, const AgentBox& inflated) {
   return radius(inflated) + map.max_box_radius_m;
 }
 
-/// Whether another box overlaps a box with clearance.
+/// Whether `other` overlaps `inflated`, a result of with_clearance().
 PICTURA_HD inline bool blocks(const AgentBox& other, const MapView& map, const AgentBox& inflated) {
   const Vec2 apart = (other.center_m - inflated.center_m).xy();
   if (!other.drawn || dot(apart, apart) > square(clearance_reach_m(map, inflated))) return false;
@@ -122,7 +123,7 @@ PICTURA_HD bool is_clear(const WorldView& world, const AgentBox& box, int begin,
   return !group.any(is_taken);
 }
 
-/// Whether a box is clear of all boxes in chains.
+/// Whether a box keeps kSpawnClearance_m from all boxes in the chains.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool is_clear(const WorldView& world, const AgentBox& box, const BoxChains& chains,
                          const ThreadGroup& group = {}) {
@@ -145,7 +146,7 @@ PICTURA_HD inline LanePose pose_of(const WorldView& world, int agent, RoutePoint
   return walks(world, agent) ? pose_on_walk(world.map, at.lane, at.s_m) : pose_on_lane(world.map, at.lane, at.s_m);
 }
 
-/// Returns the next waypoint of a pedestrian: after the gap, and further on until no parked car covers it.
+/// Returns the next waypoint of a pedestrian: a random gap ahead, then farther ahead until no parked car covers it.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD RoutePoint next_walk_waypoint(const WorldView& world, int agent, RoutePoint at, RandomStream* random_inout,
                                          const ThreadGroup& group = {}) {
@@ -161,8 +162,8 @@ PICTURA_HD RoutePoint next_walk_waypoint(const WorldView& world, int agent, Rout
   return at;
 }
 
-/// Draws a new goal chain that starts at the end of the last chain. A record ends with its goal, without further
-/// chains.
+/// Draws a new goal chain that starts at the end of the last chain. On maps with a record, an agent has only one goal,
+/// so this only marks the goal as reached.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void draw_goal_chain(const WorldView& world, int agent, const ThreadGroup& group = {}) {
   const AgentStateView& agents = world.agents;
@@ -191,16 +192,16 @@ PICTURA_HD void draw_goal_chain(const WorldView& world, int agent, const ThreadG
   agents.goal_chains[slot] = chain + 1;
 }
 
-/// Returns the spot of parked car `car` of the world at its try `i`. The map must have spots.
+/// Returns the random parking spot of try `i` for parked car `car`. The map must have parking spots.
 PICTURA_HD inline const ParkingSpot& parking_spot(const WorldView& world, int car, int i) {
-  constexpr int kDrawsBefore = 2;  // its length and width
+  constexpr int kDrawsBefore = 2;  // length and width of the car
   RandomStream random = agent_stream(world, car, 0, Purpose::parked_cars);
   random.skip(kDrawsBefore + i);
   const Span<const ParkingSpot> spots = world.map.parking_spots;
   return spots[random.below(static_cast<int>(spots.size()))];
 }
 
-/// Returns the box of parked car `car` on `spot`, or outside the kerb there.
+/// Returns the box of parked car `car` at `spot`.
 PICTURA_HD inline AgentBox parked_box(const WorldView& world, int car, const ParkingSpot& spot) {
   constexpr float kKerbGap_m = 0.2f;
   const ClassLimits limits = class_limits(AgentClass::vehicle);
@@ -218,7 +219,7 @@ PICTURA_HD inline AgentBox parked_box(const WorldView& world, int car, const Par
   return box;
 }
 
-/// Whether the box extends into a driven lane on its level by more than kSeamTolerance_m.
+/// Whether the box extends by more than kSeamTolerance_m into a lane on its level on which agents drive.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
   const OrientedBox print = footprint(box);
@@ -236,7 +237,8 @@ PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, cons
   return group.any(covers);
 }
 
-/// Whether the map permits the box on its spot: clear of barriers and of driven lanes and, at a kerb, off the road.
+/// Whether a car may park at `spot` with this box: the box touches no barrier and no lane on which agents drive and, at
+/// a kerb, its centre is off the road.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool may_park(const MapView& map, const AgentBox& box, const ParkingSpot& spot,
                          const ThreadGroup& group = {}) {
@@ -245,7 +247,8 @@ PICTURA_HD bool may_park(const MapView& map, const AgentBox& box, const ParkingS
          !(is_at_kerb && is_on_road(map, box.center_m.xy(), box.center_m.z, group));
 }
 
-/// Parks car `car` at its try `i`. With -1 it found no place: it is neither drawn nor part of collisions.
+/// Parks car `car` at the spot of try `i`. If i is -1, the car has found no place: its box is neither drawn nor part of
+/// collisions.
 PICTURA_HD inline void put_parked_car(const WorldView& world, int car, int i) {
   AgentBox box = parked_box(world, car, i < 0 ? ParkingSpot{} : parking_spot(world, car, i));
   box.drawn = i >= 0;
@@ -253,7 +256,8 @@ PICTURA_HD inline void put_parked_car(const WorldView& world, int car, int i) {
   world.boxes[world.num_agents + car] = world.boxes_before[world.num_agents + car] = box;
 }
 
-/// Draws a place uniformly over lengths with running sum end_m; the `lane` of the result is an index into end_m.
+/// Draws a point uniformly on a sequence of lanes. end_m is the running sum of their lengths; the `lane` of the result
+/// is an index into end_m.
 PICTURA_HD inline RoutePoint draw_place(Span<const float> end_m, RandomStream* random_inout) {
   const float at_m = random_inout->uniform(0.0f, end_m[end_m.size() - 1]);
   size_t low = 0, high = end_m.size() - 1;
@@ -268,14 +272,15 @@ PICTURA_HD inline RoutePoint draw_place(Span<const float> end_m, RandomStream* r
   return {static_cast<int32_t>(low), at_m - (low == 0 ? 0.0f : end_m[low - 1])};
 }
 
-/// Whether the map has a place where the agent could spawn; recorded agents need none.
+/// Whether the map has places where the agent could spawn. The result is false on maps with a record, whose agents need
+/// none.
 PICTURA_HD inline bool has_places(const WorldView& world, int agent) {
   if (has_record(world.map)) return false;
   return walks(world, agent) ? !world.map.walk_pieces.empty() : !world.map.spawn_lanes.empty();
 }
 
-/// Returns the place of try `i` of an agent, uniform over the length of all spawnable lanes or, for pedestrians, of all
-/// walkways in both directions. The map must have places.
+/// Returns the random point of try `i` of an agent. Points are uniformly distributed over the spawn lanes or, for
+/// pedestrians, over all walkways in both directions. The map must have such places.
 PICTURA_HD inline RoutePoint spawn_point(const WorldView& world, int agent, int i) {
   RandomStream random = agent_stream(world, agent, 0, Purpose::spawn);
   random.skip(i);
@@ -285,22 +290,22 @@ PICTURA_HD inline RoutePoint spawn_point(const WorldView& world, int agent, int 
   return at;
 }
 
-/// Returns the agent's box at its try `i`, along a lane or a walkway.
+/// Returns the agent's box at the point of try `i`, aligned with the lane or walkway.
 PICTURA_HD inline AgentBox spawn_box(const WorldView& world, int agent, int i) {
   const LanePose pose = pose_of(world, agent, spawn_point(world, agent, i));
   return box_at(world.agents, world.first_slot + agent, pose.position_m, sincos_of(pose.heading_rad));
 }
 
-/// Whether the map permits an agent's box: clear of barriers, with its centre on the road. For pedestrians, it need
-/// only be clear of walls.
+/// Whether the map permits an agent's box: it touches no barrier and its centre is on the road. The box of a pedestrian
+/// need only touch no wall.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool fits_map(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
   if (box.agent_class == AgentClass::pedestrian) return !touches_wall(map, box, group);
   return !touches_barrier(map, box, group) && is_on_road(map, box.center_m.xy(), box.center_m.z, group);
 }
 
-/// Whether a vehicle's or cyclist's reference point is before a stop line of its way and its front bumper past the
-/// line.
+/// Whether the reference point of a vehicle or cyclist is before a stop line and its front bumper is past the line.
+/// Only lines that control the agent's direction are tested.
 PICTURA_HD inline bool straddles_stop_line(const MapView& map, const AgentBox& box) {
   const Vec2 forward{box.cos_heading, box.sin_heading};
   const Vec2 bumper = front_bumper(box);
@@ -317,28 +322,28 @@ PICTURA_HD inline bool straddles_stop_line(const MapView& map, const AgentBox& b
   return false;
 }
 
-/// Whether an agent may start its episode with this box. Agents never start across a stop line, regardless of its
-/// light, because driving on from there would not count as crossing the line.
+/// Whether an agent may start its episode with this box. Agents never start on a stop line, regardless of its light,
+/// because driving on from there would not count as crossing the line.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
   return fits_map(map, box, group) && (box.agent_class == AgentClass::pedestrian || !straddles_stop_line(map, box));
 }
 
-/// Whether the agent that chose try `i` is part of the episode; -1 means that it found no place. Recorded agents are
-/// part of it; if some tracks are replayed, only the agents that are present at the start.
+/// Whether the agent takes part in the episode. `i` is the try at which it found a place, or -1. On maps with a record,
+/// all agents take part; but if some tracks are replayed, only agents that are present at the start.
 PICTURA_HD inline bool joins_episode(const WorldView& world, int agent, int i) {
   if (has_replayed_tracks(world.map)) return has_body(world.agents.status[world.first_slot + agent]);
   return i >= 0 || has_record(world.map);
 }
 
-/// Places the agent on its route with a speed along the route, and draws its first goals.
+/// Places the agent at `at` with a speed along the route, and draws its first goal chain.
 template <typename ThreadGroup>
 PICTURA_HD void put_on_route(const WorldView& world, int agent, RoutePoint at, float speed_mps,
                              const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   const LanePose pose = pose_of(world, agent, at);
-  // A pedestrian's place is on a walkway, so it has no lane yet.
+  // `at` of a pedestrian is on a walkway, so the pedestrian has no lane yet.
   const int32_t own_lane = walks(world, agent) ? -1 : at.lane;
   const LaneFit fit =
       fit_agent(world, agent, pose.position_m.xy(), pose.position_m.z, pose.heading_rad, own_lane, group);
@@ -359,8 +364,8 @@ PICTURA_HD void put_on_route(const WorldView& world, int agent, RoutePoint at, f
   draw_goal_chain(world, agent, group);
 }
 
-/// Places the agent at its try `i`, standing still, and draws its first goals; with -1 it stays absent. A recorded
-/// agent is placed at the start of its record.
+/// Places the agent at the point of try `i`, at rest, and draws its first goal chain. If i is -1, the agent stays
+/// absent. On maps with a record, the agent is placed at the start of its record.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void place_agent(const WorldView& world, int agent, int i, const ThreadGroup& group = {}) {
   const AgentStateView& agents = world.agents;

@@ -1,5 +1,5 @@
-// One step of one agent, in three phases with barriers between them, so that every phase reads only data that an
-// earlier phase has finished: advance (own motion, road, lights, goals), collisions (all boxes), reward and halt.
+// One step of one agent, in three phases: (1) advance: motion, road, lights and goals; (2) collisions with all boxes;
+// (3) reward and halt. All agents of a world finish a phase before any agent begins the next phase.
 #pragma once
 
 #include "pictura/simulator/command.h"
@@ -18,7 +18,7 @@ PICTURA_HD inline bool takes_actions(const WorldView& world, int agent) {
   return takes_actions(world.agents.status[world.first_slot + agent]);
 }
 
-/// Whether the agent left the map in the last step, at the end of a road.
+/// Whether the agent left the map at the end of a road in the last step.
 PICTURA_HD inline bool has_left(const WorldView& world, int agent) {
   return world.map.is_open && world.agents.left[world.first_slot + agent] != 0;
 }
@@ -40,19 +40,21 @@ PICTURA_HD inline Vec3 waypoint_of(const AgentStateView& agents, int slot, int i
   return {agents.waypoint_x_m[i], agents.waypoint_y_m[i], agents.waypoint_z_m[i]};
 }
 
-/// Additional event bit of a step: the agent leaves a road that ends. Stored in a separate field.
+/// Additional event bit of a step: the agent leaves the map. The field `left` stores it, because `events` has only 8
+/// bits.
 constexpr int kLeaves = 256;
 
-/// Whether the agent's last waypoint lies at the end of routes.
+/// Whether the agent's route ends at its last waypoint.
 PICTURA_HD inline bool ends_way(const WorldView& world, int agent) {
   const int slot = world.first_slot + agent;
   return world.map.is_open && !walks(world, agent) &&
          is_at_route_end(world.map, {world.agents.goal_lane[slot], world.agents.goal_lane_s_m[slot]});
 }
 
-/// Passes waypoints along the way from `from` to `to`; returns event bits. The last waypoint becomes the metric's goal
-/// when it becomes active. It remains the goal until it is passed within kMetricGoalRadius_m or the next chain's last
-/// waypoint replaces it. So a wide reward radius does not keep an agent from reaching it.
+/// Tests whether the motion from `from` to `to` passes waypoints; returns event bits. The goal of the metric Goals is a
+/// chain's last waypoint, from the time at which it becomes active. It remains the goal until it is passed within
+/// kMetricGoalRadius_m, or until the next chain's last waypoint replaces it. So an agent can still reach it after
+/// passing it at the larger distance that the reward accepts.
 template <typename ThreadGroup>
 PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3 to, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
@@ -90,7 +92,7 @@ PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3
   return events | kEventWaypoint;
 }
 
-/// Returns the parameters of an agent's dynamics: multipliers of its conditioning, its body, and the world's rules.
+/// Returns the parameters of an agent's dynamics.
 PICTURA_HD inline DynamicsParameters dynamics_of(const WorldView& world, int slot) {
   const AgentStateView& agents = world.agents;
   const float* conditioning = agents.conditioning + slot * kNumConditioning;
@@ -125,12 +127,14 @@ PICTURA_HD inline bool is_follow_record_command(const Command& command) {
   return command.kind == CommandKind::recorded;
 }
 
-/// Whether a command to follow the record has an effect: on all agents that have not halted, including absent agents.
+/// Whether a command to follow the record has an effect: the map must have a record, and the agent must not have
+/// halted.
 PICTURA_HD inline bool may_follow_record(const WorldView& world, int agent) {
   return has_record(world.map) && world.agents.status[world.first_slot + agent] != AgentStatus::halted;
 }
 
-/// Returns the commanded motion of an agent after the step. The new level is searched near *z_m_inout.
+/// Returns the motion of an agent after a step with this command. *z_m_inout is the height near which the road is
+/// searched; a kinematic_state command replaces it.
 PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, int32_t action, float*) {
   const int slot = world.first_slot + agent;
   const Motion from = motion_of(world.agents, slot);
@@ -138,7 +142,7 @@ PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, int
   DynamicsParameters parameters = dynamics_of(world, slot);
   if (active_impairment(world, agent) == Impairment::phantom_braking) {
     controls.jerk_long_mps3 = braking_jerk_mps3(from);
-    parameters.rules.reset_at_standstill = true;  // otherwise braking would drive it backwards
+    parameters.rules.reset_at_standstill = true;  // otherwise braking would make it reverse
   }
   return move(from, controls, parameters, class_limits(world.agents.agent_class[slot]), world.options.dt_s);
 }
@@ -153,8 +157,8 @@ PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, con
   return motion;
 }
 
-/// Phase 1 in step `step` of the episode, counted from 1: moves an agent by an action or a Command, and evaluates the
-/// road at its new place. Only the first thread of its group writes, after all threads have read.
+/// Phase 1 of step `step` of the episode, counted from 1: moves an agent by an action or a Command, and evaluates the
+/// road at its new position. Only the first thread of the group writes, after all threads have read.
 template <typename CommandType, typename ThreadGroup = SingleThread>
 PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& command, int step,
                         const ThreadGroup& group = {}) {
@@ -168,7 +172,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   if (!takes_actions(world, agent)) {
     if (group.rank() > 0) return;
     if (world.map.is_open) agents.left[slot] = 0;
-    // An agent that left at the end of the last step was still visible in it.
+    // The box of an agent that left in the last step has remained visible until now.
     const bool is_gone = !has_body(agents.status[slot]) && before.drawn;
     if (is_gone) return remove_box(world, agent);
     world.boxes_before[agent] = before;
@@ -215,7 +219,8 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   if (world.map.is_open) agents.left[slot] = (events & kLeaves) != 0;
 }
 
-/// Phase 2: finds the collisions of an active agent with all other boxes, including halted and parked ones.
+/// Phase 2: finds the collisions of an active agent with all other boxes, including those of halted agents and parked
+/// cars.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void find_collisions(const WorldView& world, int agent, const ThreadGroup& group = {}) {
   if (!is_active(world, agent)) return;
@@ -245,7 +250,7 @@ PICTURA_HD void find_collisions(const WorldView& world, int agent, const ThreadG
   events = static_cast<uint8_t>(events | kEventCollision | (is_at_fault ? kEventAtFault : kEventNone));
 }
 
-/// Converts a step's events for the reward; `motion` is that before an infraction halts the agent.
+/// Converts a step's event bits for the reward. `motion` is the motion before an infraction halts the agent.
 PICTURA_HD inline StepFacts step_facts(const Motion& motion, const LaneFit& fit, int events) {
   StepFacts facts;
   facts.motion = motion;
@@ -258,10 +263,10 @@ PICTURA_HD inline StepFacts step_facts(const Motion& motion, const LaneFit& fit,
   return facts;
 }
 
-/// Phase 3: the reward of an active agent, and its end: the halt after an infraction, or leaving after an infraction,
-/// at its goal, or where its road ends. An agent that leaves is absent or waits, but its box remains until the next
-/// step, in which it takes no part in collisions. Returns the reward's terms. No phase 2 of another agent reads what
-/// this phase writes.
+/// Phase 3: computes the reward of an active agent and returns its terms. After an infraction, the agent halts or
+/// leaves, as options.after_infraction says; it also leaves at its goal (options.leave_at_goal) or where its road ends.
+/// An agent that leaves becomes absent or waiting, but its box remains visible until the next step, in which it takes
+/// no part in collisions. Phase 2 of other agents reads no data that this phase writes.
 PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int agent) {
   if (!is_active(world, agent)) return {};
   const AgentStateView& agents = world.agents;

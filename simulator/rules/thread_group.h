@@ -1,7 +1,7 @@
 // Cooperation of several threads in the loops of one agent's rules. Rules that loop over many items take a thread
-// group. Its threads run in lockstep, call the rule with the same arguments, process every size()-th item each, and all
-// return the same result. A host passes SingleThread. Only results that do not depend on the order of items are shared:
-// whether any item satisfies a condition, and the smallest item.
+// group. The threads of a group run in lockstep and call the rule with the same arguments. Each thread processes every
+// size()-th item, and all threads return the same result. CPUs pass SingleThread. Threads combine only results that do
+// not depend on the order of items: whether any item satisfies a condition, sums of integers, and the smallest item.
 #pragma once
 
 #include "pictura/simulator/rules/fast/nearest.h"
@@ -20,12 +20,12 @@ struct SingleThread {
   PICTURA_HD void sync() const {}
   PICTURA_HD bool any(bool value) const { return value; }
   PICTURA_HD int sum(int value) const { return value; }
-  /// Returns the value of the thread with the lowest (score, index); scores are not negative.
+  /// Returns the value of the thread with the lowest (score, index). Scores must not be negative.
   template <typename T>
   PICTURA_HD T of_lowest(float, int, const T& value) const {
     return value;
   }
-  /// Returns the value of the thread of that rank.
+  /// Returns the value of the thread with the given rank.
   template <typename T>
   PICTURA_HD T from(int, const T& value) const {
     return value;

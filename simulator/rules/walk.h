@@ -1,4 +1,4 @@
-// Routes of pedestrians along the pieces of the walkways, which turn back at dead ends.
+// Routes of pedestrians along pieces of walkways. At a dead end, a route turns back.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// Returns the pose at distance s_m from the start of a piece, heading along it.
+/// Returns the pose at distance s_m from the start of a piece; its heading is the piece's direction.
 PICTURA_HD inline LanePose pose_on_walk(const MapView& map, int32_t piece_index, float s_m) {
   const WalkPiece& piece = map.walk_pieces[piece_index];
   const float along = clamp(s_m, 0.0f, piece.length_m);
@@ -14,7 +14,8 @@ PICTURA_HD inline LanePose pose_on_walk(const MapView& map, int32_t piece_index,
   return {{xy.x, xy.y, height_on(piece, along)}, piece.heading_rad};
 }
 
-/// Returns the piece that follows a piece: all ways except the way back are equally likely.
+/// Returns the next piece of a random route after a piece. All pieces that leave its end, except the way back, are
+/// equally likely. At a dead end, returns the way back.
 PICTURA_HD inline int32_t choose_way(const MapView& map, int32_t piece_index, RandomStream* random_inout) {
   const WalkPiece& piece = map.walk_pieces[piece_index];
   if (piece.next >= 0) return piece.next;
@@ -29,7 +30,7 @@ PICTURA_HD inline int32_t choose_way(const MapView& map, int32_t piece_index, Ra
   return back;
 }
 
-/// Advances distance_m along walkways from s_m on a piece.
+/// Returns the point distance_m ahead of `at` on a random route along walkways.
 PICTURA_HD inline RoutePoint advance_along_walkway(const MapView& map, RoutePoint at, float distance_m,
                                                    RandomStream* random_inout) {
   constexpr int kMaxPiecesWalked = 1024;  // a safety bound, for many pieces of a few centimetres
@@ -43,8 +44,8 @@ PICTURA_HD inline RoutePoint advance_along_walkway(const MapView& map, RoutePoin
   return {at.lane, 0.0f};
 }
 
-/// Returns the lane of fit_lane(). Pedestrians stand at the height of the nearest walkway within kWalkReach_m on their
-/// level, unless the lane is nearer.
+/// Returns the result of fit_lane() for a pedestrian, with another height: that of the nearest walkway on the
+/// pedestrian's level within kWalkReach_m, unless the lane is nearer than the walkway.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD LaneFit fit_walk(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane,
                             const ThreadGroup& group = {}) {

@@ -1,4 +1,4 @@
-// Selection of the nearest of many items, eight distances at a time.
+// Selection of the nearest of many items. It computes eight distances at a time.
 #pragma once
 
 #include "pictura/common/math.h"
@@ -7,8 +7,8 @@
 
 namespace pictura {
 
-/// The nearest of the added items, in ascending order of squared distance, then item; items are not negative. The code
-/// has no branches, since processors cannot predict the place of an item in the order.
+/// Keeps the `capacity` nearest of all added items, in ascending order of squared distance, then of item. Items must
+/// not be negative. Insertion has no branches, because processors cannot predict the position of an item in the order.
 template <int capacity>
 class NearestOfOneThread {
  public:
@@ -16,10 +16,11 @@ class NearestOfOneThread {
     keys_.insert(is_one ? key_of(distance2, item) : Keys::kNone);
     count_ += is_one;
   }
-  /// Offers the items whose squared distance from a point is below below2, except item `except`.
+  /// Adds the items whose squared distance from a point is less than below2, except item `except`.
   PICTURA_HD void offer_all(const Vec2* places, const int32_t* items, int num_items, int32_t except, Vec2 from,
                             float below2) {
-    // Near items are gathered first, because whether an item is near is as hard to predict as its place in the order.
+    // Near items are first collected in a buffer without branches, because it is hard to predict whether an item is
+    // near.
     float near_distance2[kGathered + 8];
     int32_t near_items[kGathered + 8];
     int num_near = 0;
@@ -68,7 +69,7 @@ class NearestOfOneThread {
   PICTURA_HD int32_t item(int at) const { return items_[at]; }
 
  private:
-  // The bits of nonnegative floats have the order of the floats.
+  // Nonnegative floats and their bits, read as integers, have the same order.
   PICTURA_HD static int64_t key_of(float distance2, int32_t item) {
     return int64_t{static_cast<int32_t>(bits_from_float(distance2))} << 32 | item;
   }

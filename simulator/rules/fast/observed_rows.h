@@ -1,4 +1,4 @@
-// Rows of entity sets, computed eight floats at a time: EgoFrame::to_local() and turn(), times the scales of the
+// Rows of entity sets, computed eight floats at a time: transformation to the ego frame, times the scales of the
 // features.
 #pragma once
 
@@ -9,21 +9,22 @@
 
 namespace pictura {
 
-/// The ego frame for eight floats that hold a place (0, 1, 2) and a direction (4, 5), or two places.
+/// Transforms eight floats to the ego frame. The floats contain a position (floats 0, 1, 2) and a direction (4, 5), or
+/// two positions (0, 1, 2 and 4, 5, 6).
 struct RowFrame {
   Float8 minus_origin, cos, sin;
 
   PICTURA_HD explicit RowFrame(const EgoFrame& frame) : RowFrame(frame, {}) {}
   PICTURA_HD static RowFrame of_two_places(const EgoFrame& frame) { return {frame, frame.origin_m}; }
 
-  /// EgoFrame::to_local() of the place and turn() of the direction.
+  /// Applies EgoFrame::to_local() to positions and EgoFrame::turn() to directions.
   PICTURA_HD Float8 to_local(const Float8& row) const {
     const Float8 moved = row + minus_origin;
     return blend<0b00110011>(moved, moved * cos + swap_pairs(moved) * sin);
   }
 
  private:
-  // x + -0 is x, even if x is -0.
+  // The unused floats are -0, because x + -0 is x for every x, even for -0.
   PICTURA_HD RowFrame(const EgoFrame& frame, Vec3 second_origin_m)
       : minus_origin(set8(-frame.origin_m.x, -frame.origin_m.y, -frame.origin_m.z, -0.0f, -second_origin_m.x,
                           -second_origin_m.y, -second_origin_m.z, -0.0f)),
@@ -32,14 +33,15 @@ struct RowFrame {
 };
 
 #ifdef offsetof  // undefined under NVRTC
-// Members that are read as eight floats.
+// These members are read as eight consecutive floats.
 static_assert(offsetof(AgentBox, cos_heading) == 3 * sizeof(float) &&
               offsetof(AgentBox, height_m) == 7 * sizeof(float));
 static_assert(offsetof(StopLine, right_m) == 3 * sizeof(float) && sizeof(StopLine) >= 8 * sizeof(float));
 #endif
 
-// Functions here never return a Float8: a program may contain code for both of its types, and a function's mangled name
-// does not include its return type.
+// Functions without a Float8 parameter do not return a Float8. A program may contain code for two different types
+// Float8, and a function's mangled name contains the types of its parameters, but not its return type. The linker could
+// not tell such functions apart.
 
 /// Writes the row of a partner.
 PICTURA_HD inline void write_partner(const AgentBox& box, float speed_mps, const RowFrame& frame, float* row_out) {
@@ -60,10 +62,11 @@ PICTURA_HD inline void write_piece(const ObservedPiece& piece, const RowFrame& f
 }
 static_assert(kLaneFeatures == 7 && kBoundaryFeatures == 7 && kWallFeatures == 7);
 
-/// Writes the rows of `count` pieces into a set of `capacity` rows.
+/// Writes the rows of the `count` pieces with indices `chosen` into a set of `capacity` rows.
 PICTURA_HD inline void write_pieces(Span<const ObservedPiece> pieces, const int32_t* chosen, int count, int capacity,
                                     const RowFrame& frame, float* rows_out) {
-  // The zero after a row falls on the start of the next row; only the set's last row has no room for it.
+  // write_piece() writes a zero behind the row. The next row overwrites it, but behind the set's last row there is no
+  // room.
   const int num_followed = min_of(count, capacity - 1);
   for (int i = 0; i < num_followed; ++i, rows_out += kLaneFeatures) {
     write_piece(pieces[chosen[i]], frame, rows_out);
@@ -80,7 +83,7 @@ struct LocalEnds {
   Vec3 left_m, right_m;
 };
 
-/// Returns the ends of a stop line; `frame` is RowFrame::of_two_places().
+/// Returns the ends of a stop line. `frame` must come from RowFrame::of_two_places().
 PICTURA_HD inline LocalEnds ends_of(const StopLine& line, const RowFrame& frame) {
   float ends[8];
   store8(frame.to_local(permute<0, 1, 2, 6, 3, 4, 5, 7>(load8(&line.left_m.x))), ends);
