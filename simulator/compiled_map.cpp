@@ -12,7 +12,7 @@ namespace {
 
 void add_range(Hash64* hash_inout, IndexRange range) { add_values(hash_inout, range.begin, range.end); }
 
-/// Hash of everything in a map that the simulator reads.
+/// Returns a hash of all data of a road map that the simulator reads.
 uint64_t fingerprint_of(const RoadMap& map) {
   static_assert(sizeof(LanePoint) == 6 * sizeof(float) && sizeof(RoadEdge) == 6 * sizeof(float));
   static_assert(sizeof(ParkingSpace) == 6 * sizeof(float) && sizeof(BuildingLine) == 6 * sizeof(float));
@@ -40,7 +40,7 @@ uint64_t fingerprint_of(const RoadMap& map) {
   return hash.value();
 }
 
-/// Hash that includes the record.
+/// Returns a hash that includes the record.
 uint64_t fingerprint_of(const RoadMap& map, const MapRecord& record) {
   static_assert(sizeof(RecordedAgent) == 7 * sizeof(float) && sizeof(RecordedState) == 6 * sizeof(float));
   Hash64 hash;

@@ -21,14 +21,16 @@
 namespace pictura {
 namespace {
 
-/// Tolerance of observed pieces along curves, so that junctions do not fill the observation with short pieces.
+/// Maximum distance of observed pieces from curves. It is large, so that junctions do not fill the observation with
+/// short pieces.
 constexpr float kObservedChordError_m = 0.25f;
 constexpr float kNearCell_m = 10.0f;
-constexpr float kCellRadius_m = 0.5f * 1.41421356f * kNearCell_m + 0.1f;  // half a diagonal, plus room for rounding
+constexpr float kCellRadius_m = 0.5f * 1.41421356f * kNearCell_m + 0.1f;  // half a diagonal, plus a margin for rounding
 constexpr float kLookupCell_m = 5.0f;
-/// Distance of waypoints from the end of the way on open maps.
+/// Distance between the end of routes and the end of lanes on open maps.
 constexpr float kRouteEndMargin_m = 5.0f;
-/// Maximum distance of agents from drivable lanes; cells farther out list nothing to observe.
+/// Lists of observable items are made only for cells within this distance of drivable lanes, because agents are not
+/// farther away.
 constexpr float kObserverReach_m = 15.0f;
 
 Aabb2 box_of_segment(Vec2 a, Vec2 b, float reach_m) {
@@ -45,9 +47,9 @@ float distance_to_segment(Vec2 p, Vec2 a, Vec2 b) {
 
 /// Rules for cutting observed pieces out of polylines.
 struct PieceRule {
-  float chord_error_m;  // points within this distance of a straight line are omitted
-  float longest_m;      // longer pieces are cut evenly
-  bool joins_all;       // lines of any length are made and then cut; otherwise lines end where a piece must
+  float chord_error_m;  // points within this distance of a piece are omitted
+  float longest_m;      // maximum length of a piece
+  bool joins_all;       // whether straight parts are cut evenly; otherwise pieces end at points
 };
 
 PieceRule piece_rule(float observed_span_m) {
@@ -56,7 +58,7 @@ PieceRule piece_rule(float observed_span_m) {
   return {kObservedChordError_m, kMaxPiece_m, false};
 }
 
-/// Cuts a polyline into observed pieces with this extent.
+/// Cuts a polyline into observed pieces. For `extent` see ObservedPiece.
 void append_pieces(const std::vector<Vec3>& points, float extent, const PieceRule& rule,
                    std::vector<ObservedPiece>* pieces_out) {
   for (size_t begin = 0; begin + 1 < points.size();) {
@@ -82,9 +84,9 @@ void append_pieces(const std::vector<Vec3>& points, float extent, const PieceRul
   }
 }
 
-/// Adds lanes. `open` is null on maps with endless roads and on recorded scenes.
+/// Adds lanes. `open` is null on maps whose roads do not end and on recorded scenes.
 void add_lanes(const RoadMap& map, const PieceRule& rule, const OpenLanes* open, MapRules* out) {
-  bool starts_in_junctions = open != nullptr;  // true if agents can start nowhere else
+  bool starts_in_junctions = open != nullptr;  // whether agents can start only in junctions
   for (size_t index = 0; index < map.lanes.size() && starts_in_junctions; ++index) {
     starts_in_junctions = map.lanes[index].in_junction || !is_open(map, *open, index);
   }
@@ -157,8 +159,8 @@ void add_lanes(const RoadMap& map, const PieceRule& rule, const OpenLanes* open,
   }
 }
 
-/// Adds exits, and entries with their turns: entries within kSharedTurn_m of each other, directly or transitively,
-/// share a turn.
+/// Adds exits and entries. Entries get the same `turn` if they are within kSharedTurn_m of each other, directly or
+/// through other entries.
 void add_openings(const OpenLanes& open, MapRules* out) {
   constexpr float kSharedTurn_m = 5.0f;
   for (const LaneOpening& exit : open.exits) {
@@ -187,7 +189,7 @@ void add_barriers(const RoadMap& map, Span<const WallFace> walls, const PieceRul
   };
   for (const RoadEdge& edge : map.road_edges) {
     out->edges.push_back({edge.a_m.xy(), edge.b_m.xy(), 0.5f * (edge.a_m.z + edge.b_m.z)});
-    // Consecutive edges with a common point form one line.
+    // Consecutive edges that share a point form one polyline.
     if (line.empty() || line.back().x != edge.a_m.x || line.back().y != edge.a_m.y) {
       finish_line();
       line.push_back(edge.a_m);
@@ -229,10 +231,10 @@ Grid cells_of(const std::vector<Item>& items, ToBox&& to_box) {
   return Grid(boxes, kLookupCell_m);
 }
 
-/// Adds the spot outside the kerb nearest to p, if it is within reach_m. Under right-hand traffic, the kerb is to the
-/// right of the cars beside it. A road edge has the road on its own right, so the cars point against the edge.
+/// Adds a parking spot at the kerb nearest to p, if the kerb is within reach_m. In right-hand traffic, parked cars have
+/// the kerb on their right. A road edge has the road on its right, so cars point in the direction opposite to the edge.
 void add_kerb_spot(Vec3 p, float reach_m, MapRules* out) {
-  const Barrier* nearest = nullptr;  // the first among equally near barriers
+  const Barrier* nearest = nullptr;  // the first of equally near barriers
   float best_m = reach_m;
   visit_items(out->edge_cells.view(), box_of_segment(p.xy(), p.xy(), reach_m), [&](size_t item) {
     const Barrier& edge = out->edges[item];
@@ -252,7 +254,7 @@ void add_kerb_spot(Vec3 p, float reach_m, MapRules* out) {
   out->parking_spots.push_back({{at.x, at.y, p.z}, std::atan2(-along.y, -along.x), left_normal(along)});
 }
 
-/// Adds parking spaces and, outside junctions, a spot every few metres of parking lanes and of the kerbs along
+/// Adds parking spaces. Outside junctions, also adds spots at regular distances on parking lanes and at the kerbs of
 /// shoulders and sidewalks.
 void add_parking_spots(const RoadMap& map, MapRules* out) {
   constexpr float kSpacing_m = 7.0f;
@@ -280,9 +282,9 @@ void add_parking_spots(const RoadMap& map, MapRules* out) {
   }
 }
 
-/// Stores the record, and the maximum size and speed of its agents.
+/// Stores the record and computes the maximum size and speed of its agents.
 void add_record(MapRecord record, MapRules* out) {
-  constexpr float kRoom = 1.0f + 1e-6f;  // so that rounding leaves the largest box within the radius
+  constexpr float kRoom = 1.0f + 1e-6f;  // margin for rounding
   out->max_box_radius_m = kMaxBoxRadius_m;
   out->max_speed_mps = kMaxSpeed_mps;
   for (const RecordedAgent& agent : record.agents) {
@@ -296,24 +298,25 @@ void add_record(MapRecord record, MapRules* out) {
   out->record = std::move(record);
 }
 
-/// Items within range of a cell's centre, nearest first.
+/// Items within a range of a cell's centre, nearest first.
 struct Neighbors {
   std::vector<int32_t> items;
   std::vector<float> distance_m;
-  std::vector<float> x_m, y_m;  // from the centre
+  std::vector<float> x_m, y_m;  // relative to the centre
 
   size_t size() const { return items.size(); }
 };
 
-/// Finds the points in `cells` within range of a place, nearest first; of two equally far points, the lower index is
-/// first. `keys` is scratch memory.
+/// Finds the points of `cells` within range_m of `center`, nearest first. Equally far points are ordered by index.
+/// `keys` is scratch memory.
 void find_neighbors(const std::vector<Vec2>& points, const GridView& cells, Vec2 center, float range_m,
                     std::vector<uint64_t>* keys, Neighbors* out) {
   keys->clear();
   const Vec2 reach{range_m, range_m};
   visit_items(cells, {center - reach, center + reach}, [&](size_t item) {
     const float distance = length(points[item] - center);
-    // Nonnegative floats have the order of their bits, so that one integer comparison suffices, which is much faster.
+    // Nonnegative floats have the same order as their bits. So the sort compares one integer per key, which is much
+    // faster.
     if (distance <= range_m) keys->push_back(uint64_t{std::bit_cast<uint32_t>(distance)} << 32 | item);
   });
   std::sort(keys->begin(), keys->end());
@@ -331,9 +334,10 @@ void find_neighbors(const std::vector<Vec2>& points, const GridView& cells, Vec2
   }
 }
 
-/// Makes lists for every cell that may contain an observer. The items whose points lie within range of the cell's
-/// centre, nearest first, are passed to `append(neighbors, &lists)`, which appends lists_per_cell lists. Throws Error
-/// naming the map when the lists would take more than a gigabyte, which also ensures that they fit their 32-bit ends.
+/// Makes lists for every cell that may contain an observer. For each cell, it calls append(neighbors, &lists), which
+/// appends lists_per_cell lists; `neighbors` are the items whose points are within range_m of the cell's centre. Throws
+/// Error, which names the map, if the lists would take more than a gigabyte. The limit also ensures that 32-bit indices
+/// suffice.
 template <typename Append>
 CellLists lists_by_distance(const MapRules& map, const std::string& map_name, const std::vector<Vec2>& points,
                             float range_m, int lists_per_cell, Append&& append) {
@@ -368,7 +372,7 @@ CellLists lists_by_distance(const MapRules& map, const std::string& map_name, co
                                                 static_cast<float>(cell / static_cast<size_t>(lists.num_x)) + 0.5f} *
                                                kNearCell_m;
       find_neighbors(points, point_cells, center, range_m, &keys, &found);
-      // Checked before they are made, since one cell may need all of them.
+      // The size is checked before the items are appended, because a single cell may exceed the limit.
       PICTURA_CHECK(lists.items.size() + found.size() * static_cast<size_t>(lists_per_cell) <= kMaxItems,
                     "map {}: expected at most {} entries in the lists of nearby elements, got more: too many elements "
                     "within {} m of ({}, {})",
@@ -383,13 +387,15 @@ CellLists lists_by_distance(const MapRules& map, const std::string& map_name, co
 
 void end_list(CellLists* lists_inout) { lists_inout->begin.push_back(static_cast<int32_t>(lists_inout->items.size())); }
 
-/// Determines the neighbours that an observer in the cell may see with a heading between two directions: `right` and,
-/// less than half a turn counter-clockwise of it, `left`. The result is 1 or 0, and never 0 for a visible neighbour.
-/// Neighbours must not be farther than the far corner of the visible range. This takes most of the time of compiling a
-/// map, so it uses neither angles nor branches. Conditions are integers because compilers vectorize only these.
+/// Determines which neighbours may be visible to an observer in the cell with a heading between two directions. `left`
+/// must be less than 180 degrees counter-clockwise from `right`. The result is 1 or 0 for each neighbour, and never 0
+/// for a visible neighbour. Neighbours must not be farther than the far corner of the visible range. Most of the time
+/// of compiling a map is spent here, so the code uses neither angles nor branches. Conditions are integers, because
+/// compilers vectorize only these.
 void find_visible(const Neighbors& neighbors, Vec2 right, Vec2 left, std::vector<int32_t>* seen_out) {
   constexpr float most_behind_m = kRoadBehind_m + kCellRadius_m, most_aside_m = kRoadAside_m + kCellRadius_m;
-  // A piece behind also enters the window sideways as the heading turns away from it, so pieces this close are kept.
+  // As the heading turns, a piece behind the visible range can also enter it from the side, so pieces this close are
+  // kept.
   const float close_m = std::sqrt(square(most_behind_m) + square(most_aside_m));
   const size_t count = neighbors.size();
   seen_out->resize(count);
@@ -399,8 +405,8 @@ void find_visible(const Neighbors& neighbors, Vec2 right, Vec2 left, std::vector
     const float x_m = xs[i], y_m = ys[i], distance_m = distances[i];
     const float along_right_m = x_m * right.x + y_m * right.y, along_left_m = x_m * left.x + y_m * left.y;
     const float left_of_right_m = right.x * y_m - right.y * x_m, right_of_left_m = left.y * x_m - left.x * y_m;
-    // Lateral distance at the heading nearest to the direction of the piece. The distance ahead at that heading is
-    // irrelevant: as the heading turns away, a piece beyond the window's end enters the far corner.
+    // Lateral distance at the heading that is nearest to the direction of the piece. The distance ahead at that heading
+    // is not tested: as the heading turns away, a piece beyond the front of the visible range can enter its far corner.
     const float ahead_m = along_right_m > along_left_m ? along_right_m : along_left_m;
     const float aside_m = std::fabs(along_right_m > along_left_m ? left_of_right_m : right_of_left_m);
     const int32_t is_between = int32_t{left_of_right_m >= 0} & int32_t{right_of_left_m >= 0};
@@ -410,7 +416,7 @@ void find_visible(const Neighbors& neighbors, Vec2 right, Vec2 left, std::vector
   }
 }
 
-/// First direction of a sector of headings, in the order of cell_and_sector_at(); see Place.
+/// Returns the direction at which a heading sector begins; see near_place().
 Vec2 sector_begin(int sector) {
   const float heading_rad = -kPi + static_cast<float>(sector) * (kTwoPi / kSectors);
   return {std::cos(heading_rad), std::sin(heading_rad)};
@@ -429,7 +435,8 @@ CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, cons
                            [&seen](const Neighbors& neighbors, CellLists* lists) {
                              for (int sector = 0; sector < kSectors; ++sector) {
                                find_visible(neighbors, sector_begin(sector), sector_begin(sector + 1), &seen);
-                               // Each neighbour is written, and the next one overwrites it if it is not visible.
+                               // To avoid a branch, each neighbour is written; if it is not visible, the next neighbour
+                               // overwrites it.
                                size_t end = lists->items.size();
                                lists->items.resize(end + neighbors.size());
                                for (size_t i = 0; i < neighbors.size(); ++i) {
@@ -442,8 +449,8 @@ CellLists lists_of_pieces(const MapRules& map, const std::string& map_name, cons
                            });
 }
 
-/// Distance beyond an end of a stop line that is covered by lanes of oncoming traffic: as far as the line controls
-/// traffic, but not past lanes in its own direction, which other lines or none control.
+/// Returns the distance from an end of a stop line to the far side of the adjacent oncoming lanes. The distance ends at
+/// lanes in the line's own direction, because other lines or none control these, and at the range of the stop line.
 float oncoming_beyond_m(const MapView& map, const StopLine& line, Vec2 outward) {
   constexpr float kStep_m = 0.25f;
   float beyond_m = 0;
@@ -464,8 +471,9 @@ float oncoming_beyond_m(const MapView& map, const StopLine& line, Vec2 outward) 
   return beyond_m;
 }
 
-/// Makes lists of all stop lines that can be among the nearest kMaxControls from anywhere in a cell: up to the distance
-/// of the last of these from the cell's centre plus the cell's diagonal.
+/// Makes a list for each cell of all stop lines that can be among the nearest kMaxControls of an observer in the cell.
+/// These are all lines up to a distance from the cell's centre: that of the kMaxControls-th nearest line, plus the
+/// cell's diagonal.
 CellLists lists_of_stop_lines(const MapRules& map, const std::string& map_name) {
   std::vector<Vec2> middles;
   for (const StopLine& line : map.stop_lines) middles.push_back(line.middle_m.xy());

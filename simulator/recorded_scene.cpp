@@ -11,7 +11,7 @@
 namespace pictura {
 namespace {
 
-/// Returns the class of a track; tracks other than pedestrians and cyclists are treated as vehicles.
+/// Returns the class of a track. All tracks except those of pedestrians and cyclists become vehicles.
 AgentClass class_of(TrackType type) {
   switch (type) {
     case TrackType::pedestrian: return AgentClass::pedestrian;
@@ -20,7 +20,7 @@ AgentClass class_of(TrackType type) {
   }
 }
 
-/// Converts a recorded box's centre to the reference point of its class.
+/// Converts a recorded state, whose position is the box's centre, to the state of the agent's reference point.
 RecordedState recorded_state(const RecordedTrack& track, const TrackState& state) {
   const SinCos heading = sincos_of(state.heading_rad);
   const float ahead_m = reference_to_center(class_of(track.type), track.length_m);
@@ -30,7 +30,7 @@ RecordedState recorded_state(const RecordedTrack& track, const TrackState& state
           1};
 }
 
-/// Returns the state of a track at a step at which it is valid.
+/// Returns the state of a track at a step. The track must be valid at this step.
 RecordedState recorded_state(const Scenario& scenario, size_t track, size_t step) {
   const size_t at = track * static_cast<size_t>(scenario.num_steps) + step;
   if (scenario.driven.empty()) return recorded_state(scenario.tracks[track], scenario.states[at]);
@@ -39,7 +39,7 @@ RecordedState recorded_state(const Scenario& scenario, size_t track, size_t step
 }
 
 MapRecord record_of(const Scenario& scenario, int32_t start_step) {
-  constexpr float kMaxRecordedRadius_m = 25.0f;  // all barriers this near to a box are tested
+  constexpr float kMaxRecordedRadius_m = 25.0f;  // contact with barriers is tested within this radius
   MapRecord record{.num_steps = scenario.num_steps - start_step, .dt_s = scenario.dt_s};
   for (size_t i = 0; i < scenario.tracks.size(); ++i) {
     const RecordedTrack& track = scenario.tracks[i];
@@ -84,7 +84,7 @@ std::vector<LightState> light_states_of(const Scenario& scenario, int32_t start_
   return states;
 }
 
-/// Returns the scene's road with its lights.
+/// Returns the scene's road map with the recorded lights added.
 std::shared_ptr<const RoadMap> road_with_lights(const Scenario& scenario) {
   PICTURA_CHECK(scenario.map.lights.empty(),
                 "scene {}: expected a map without its own lights, since recorded lights are added", scenario.id);

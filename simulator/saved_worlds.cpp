@@ -14,8 +14,8 @@ struct SavedWorld {
 
 namespace {
 
-// Returns the first world of each part, and the end of the last part, such that the number of agents before each is
-// nearest to an equal share.
+// Returns the first world of each part, and the end of the last part. The parts have about equally many agents: the
+// number of agents before a part is nearest to the part's index times an equal share.
 std::vector<size_t> part_begins(const std::vector<WorldSpec>& all, int num_parts) {
   const auto parts = static_cast<size_t>(num_parts);
   if (all.size() < parts) {

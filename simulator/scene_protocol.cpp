@@ -18,14 +18,14 @@ constexpr std::array<const char*, 2> kOverlappingWords{"replay", "drive"}, kOthe
 constexpr std::array<const char*, 3> kLateWords{"replay", "drive", "absent"},
     kInfractionWords{"halt", "leave", "drive_on"};
 
-/// Rule that can be changed: its description, parser and writer.
+/// Rule that can be changed by name: its description, and functions that parse and format its value.
 struct Rule {
   SceneRule about;
   void (*set)(const std::string& name, const std::string& value, SceneProtocol* out);
   std::string (*text)(const SceneProtocol& protocol);
 };
 
-/// Creates the rule of an enumeration, or of a bool, by its words.
+/// Makes the rule for a member that is an enumeration or a bool; kWords are the names of its values.
 template <auto kMember, const auto& kWords>
 constexpr Rule word_rule(const char* name, const char* values, const char* what) {
   return {{name, values, what},
@@ -81,7 +81,8 @@ constexpr std::array kRules{
 std::vector<SceneProtocol> make_protocols() {
   const SceneProtocol paper;
 
-  // Emerge-Lab/gpudrive: moving vehicles that are not experts, at most 64; agents that collide or arrive are removed.
+  // Emerge-Lab/gpudrive: drives at most 64 moving vehicles that are not experts; removes agents that collide or reach
+  // their goal.
   SceneProtocol gpudrive = paper;
   gpudrive.name = "gpudrive";
   gpudrive.steps = 91;
@@ -92,7 +93,7 @@ std::vector<SceneProtocol> make_protocols() {
   gpudrive.max_driven = 64;
   gpudrive.after_infraction = AfterInfraction::leave;
 
-  // PufferDrive 2.0: smaller boxes; agents at their goal become background.
+  // PufferDrive 2.0: boxes are smaller; agents that reach their goal leave the scene.
   SceneProtocol puffer2 = paper;
   puffer2.name = "pufferdrive2";
   puffer2.steps = 91;
@@ -100,13 +101,13 @@ std::vector<SceneProtocol> make_protocols() {
   puffer2.box_scale = 0.7f;
   puffer2.replay_experts = true;
 
-  // PufferDrive 3.0, womd_multi: full-size boxes; agents that arrive keep driving.
+  // PufferDrive 3.0, womd_multi: boxes have full size; agents that reach their goal drive on.
   SceneProtocol puffer3 = puffer2;
   puffer3.name = "pufferdrive3";
   puffer3.box_scale = 1;
   puffer3.leave_at_goal = false;
 
-  // Waymax: only the self-driving car is driven, for 8 s after 11 warm-up states; events are counted, but end no
+  // Waymax: drives only the self-driving car, for 8 s after 11 warm-up states. Events are counted, but do not end the
   // episode.
   SceneProtocol waymax = paper;
   waymax.name = "waymax";
@@ -119,8 +120,8 @@ std::vector<SceneProtocol> make_protocols() {
   waymax.after_infraction = AfterInfraction::drive_on;
   waymax.leave_at_goal = false;
 
-  // The Waymo sim-agents challenge: all road users present at the start are driven in 32 rollouts, regardless of
-  // events.
+  // The Waymo sim-agents challenge: drives all road users that are present at the start, in 32 rollouts, which events
+  // do not end.
   SceneProtocol simagents = waymax;
   simagents.name = "simagents";
   simagents.control = "all";

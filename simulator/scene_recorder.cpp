@@ -28,7 +28,7 @@ RecordedLightState recorded_light(LightState state) {
   }
 }
 
-/// Converts the lights of a map to recorded lights, because in worlds of recorded scenes lights have no cycles.
+/// Converts the lights of a map to recorded lights, because lights in recorded scenes have no cycles.
 void move_lights(Scenario* scenario) {
   RoadMap& map = scenario->map;
   for (const TrafficLight& light : map.lights) {
@@ -41,7 +41,7 @@ void move_lights(Scenario* scenario) {
   map.facts.traffic_lights = map.facts.stop_lines = map.facts.signal_junctions = 0;
 }
 
-/// Copies a recording's lights from a step on; after its end they have no state.
+/// Copies a recording's lights from start_step on. After the end of the recording, lights have no state.
 void copy_lights(const Scenario& from, int32_t start_step, Scenario* to) {
   to->lights = from.lights;
   to->light_lanes = from.light_lanes;
@@ -133,11 +133,11 @@ Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
   scenario.dt_s = simulator_.config().dt_s;
   scenario.num_steps = num_steps_;
   scenario.current_step = std::min(10, num_steps_ - 1);
-  const Scenario* const recorded = map.scenario.get();  // scene that the world replays
-  scenario.map = recorded ? recorded->map : *map.road;  // recorded lights are not part of it
+  const Scenario* const recorded = map.scenario.get();  // recorded scene of the world's map, or null
+  scenario.map = recorded ? recorded->map : *map.road;  // without recorded lights
   if (recorded && self_agent < 0) self_agent = recorded->sdc_track;
   const auto steps = static_cast<size_t>(num_steps_);
-  std::vector<std::pair<size_t, size_t>> lives;  // box and life; first lives before later ones
+  std::vector<std::pair<size_t, size_t>> lives;  // (box, life), ordered by life
   for (size_t i = 0; i < bodies_.size(); ++i) lives.emplace_back(i, 0);
   for (size_t i = 0; i < bodies_.size(); ++i) {
     for (size_t life = 1; life < bodies_[i].size(); ++life) lives.emplace_back(i, life);

@@ -7,8 +7,8 @@
 namespace pictura {
 namespace {
 
-/// Throws Error unless an array of observe() has [queries, rows, features] values (none where `is_observed` is false)
-/// and begins where a device can write four values at once.
+/// Checks an output array of observe(). Throws Error unless it has num_queries * rows * features values (none if
+/// `is_observed` is false) and, on a device, begins at a multiple of 16 bytes.
 template <typename T>
 void check_observed(std::string_view name, Span<T> values, bool is_observed, size_t num_queries, int rows, int features,
                     Device device) {

@@ -17,7 +17,7 @@ namespace {
 void check(const SimulatorConfig& config) {
   const auto in = [](float value, float low, float high) { return value >= low && value <= high; };
   if (config.num_threads < 0) fail_usage("simulator: threads: expected 0 (all) or more, got {}", config.num_threads);
-  // Contact is tested on the assumption that no agent drives farther in a step than its length.
+  // Contact tests assume that no agent drives farther than its length in a step.
   if (!in(config.dt_s, 0.01f, kMaxStep_s)) {
     fail_usage("simulator: dt_s: expected 0.01 to {}, got {}", kMaxStep_s, config.dt_s);
   }
@@ -102,7 +102,7 @@ void check(const SimulatorConfig& config, const CompiledMaps& maps, const std::v
       fail_usage("simulator: world {}: expected as many agents as scene {} has tracks, {}, got {}", world.global_world,
                  map.scenario->id, map.scenario->tracks.size(), world.num_agents);
     }
-    constexpr float kSameStep = 0.01f;  // relative to the recording's step: WOMD's steps are about 0.10002 s
+    constexpr float kSameStep = 0.01f;  // relative tolerance: the steps of WOMD recordings are about 0.10002 s
     if (std::abs(config.dt_s - map.scenario->dt_s) > kSameStep * map.scenario->dt_s) {
       fail_usage("simulator: dt_s: expected the {} s of scene {}, got {}", map.scenario->dt_s, map.scenario->id,
                  config.dt_s);
@@ -146,7 +146,7 @@ RuleOptions rule_options(const SimulatorConfig& config) {
   return options;
 }
 
-/// Throws UsageError when the worlds' box cells would take more than a gigabyte, since each world has its own cells.
+/// Throws UsageError if the box cells of all worlds would take more than a gigabyte. Each world has its own cells.
 void check_box_cells(const CompiledMaps& maps, const std::vector<WorldSpec>& worlds) {
   constexpr int64_t kMaxCells = int64_t{1} << 28;
   std::vector<int64_t> cells_of_map;

@@ -22,10 +22,11 @@ struct SavedHeader {
   std::array<char, 8> magic{'P', 'I', 'C', 'S', 'T', 'A', 'T', 'E'};
   uint32_t version = 5;
   uint32_t byte_order = 0x01020304;
-  uint64_t num_fingerprints = 0;  // number of following fingerprints, which saver and restorer must share
+  uint64_t num_fingerprints = 0;  // number of fingerprints that follow the header
 };
 
-/// A property that a saved state and the restoring simulator must share, by its name in messages about a mismatch.
+/// Hash of a property that must be equal in a saved state and in the simulator that restores it. Messages about a
+/// mismatch contain the name.
 struct Fingerprint {
   std::string name;
   uint64_t value = 0;
@@ -38,8 +39,8 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
     add_values(&hash, values...);
     prints.push_back({std::move(name), hash.value()});
   };
-  // Rules with a usual choice count only if the choice differs: states with the usual rules, including states of
-  // earlier versions, carry no mark.
+  // Newer options change a hash only if they differ from their default, so that states of earlier versions, which lack
+  // these options, can be restored.
   const auto add_unusual = [&prints](bool is_unusual, const auto& value) {
     if (!is_unusual) return;
     Hash64 hash;
@@ -62,7 +63,7 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
     add_values(&conditioning, range.low, range.high, range.mixture);
   }
   prints.push_back({"conditioning or dynamics (reset_at_standstill)", conditioning.value()});
-  // Two flags: the second belongs to a rule of earlier versions that no longer exists.
+  // The second flag belongs to an option of earlier versions that no longer exists.
   add_unusual(config.dynamics.reset_at_standstill, std::array{true, false});
   for (const WorldSpec& world : setup.worlds) add_values(&worlds, world.map, world.num_agents, world.global_world);
   prints.push_back({"worlds", worlds.value()});
@@ -74,7 +75,8 @@ std::vector<Fingerprint> fingerprints(const SimulatorSetup& setup) {
   return prints;
 }
 
-/// Throws Error naming the field unless every value can be simulated: indices exist and numbers are finite.
+/// Throws Error, which names the field, unless every value can be simulated: indices must exist and numbers must be
+/// finite.
 void check_restored(const SimulatorSetup& setup, const SimulatorState& state, const AgentStateView& agents) {
   constexpr float kMaxCoordinate_m = kMaxCommanded_m;
   for (size_t w = 0; w < setup.worlds.size(); ++w) {
@@ -186,7 +188,7 @@ SimulatorTotals SimulatorState::totals() const {
 
 void SimulatorState::copy_worlds(const SimulatorSetup& setup, int world, const SimulatorState& from,
                                  const SimulatorSetup& from_setup, int from_world, int count) {
-  // Arrays have `per` elements for each item that begins[world] counts.
+  // begins[world] is the index of the world's first item; arrays have `per` elements for each item.
   const auto copy = [&](auto& to_array, const auto& from_array, const std::vector<int32_t>& begins,
                         const std::vector<int32_t>& from_begins, int per) {
     const auto first = from_array.begin() + int64_t{from_begins[from_world]} * per,

@@ -13,9 +13,9 @@
 namespace pictura {
 namespace {
 
-constexpr float kSamePlace_m = 0.75f;     // ends of lanes this close are joined
+constexpr float kSamePlace_m = 0.75f;     // ends of lanes within this distance are joined
 constexpr float kMinPiece_m = 0.05f;      // minimum length of a piece
-constexpr float kCrossingReach_m = 8.0f;  // from the end of a crosswalk to its walkway
+constexpr float kCrossingReach_m = 8.0f;  // maximum distance from the end of a crosswalk to a walkway
 
 struct Edge {
   int32_t a = 0, b = 0;  // nodes
@@ -34,7 +34,7 @@ struct Network {
 
 bool same_place(Vec3 a, Vec3 b) { return length((a - b).xy()) < kSamePlace_m && std::fabs(a.z - b.z) < kLevel_m; }
 
-/// Adds the lines of walkways beside the road.
+/// Adds the centre lines of sidewalks or shoulders.
 void add_lanes(const RoadMap& map, Network* out) {
   const auto is_sidewalk = [](const Lane& lane) { return lane.type == LaneType::sidewalk; };
   const bool has_sidewalks = std::any_of(map.lanes.begin(), map.lanes.end(), is_sidewalk);
@@ -52,7 +52,7 @@ void add_lanes(const RoadMap& map, Network* out) {
     }
     ends.push_back(before);
   }
-  // Lanes that meet are joined at the end of the earlier lane, from left to right, so that only near ends are compared.
+  // Ends of lanes that meet are joined. The ends are sorted by x, so that only near ends are compared.
   std::sort(ends.begin(), ends.end(), [out](int32_t a, int32_t b) {
     return out->at(a).x < out->at(b).x || (out->at(a).x == out->at(b).x && a < b);
   });
@@ -71,7 +71,7 @@ void add_lanes(const RoadMap& map, Network* out) {
   }
 }
 
-/// Drops edges that are too short for a piece, and edges that cross the road.
+/// Removes edges that are too short for a piece, and edges whose middle is on the road.
 void drop_edges_on_road(const MapView& roads, Network* out) {
   const auto is_unfit = [&](const Edge& edge) {
     const Vec3 a = out->at(edge.a), b = out->at(edge.b), middle = (a + b) * 0.5f;
@@ -80,8 +80,8 @@ void drop_edges_on_road(const MapView& roads, Network* out) {
   out->edges.erase(std::remove_if(out->edges.begin(), out->edges.end(), is_unfit), out->edges.end());
 }
 
-/// Adds the way over a crosswalk: the centre line of the minimum-area rectangle around its outline, along the longer
-/// side.
+/// Computes the centre line of a crosswalk: that of the minimum-area rectangle around its outline, parallel to the
+/// longer side.
 void add_middle_line(Span<const Vec3> outline, Vec3* a_out, Vec3* b_out) {
   float min_area = INFINITY;
   for (size_t i = 0; i < outline.size(); ++i) {
@@ -110,14 +110,14 @@ void add_middle_line(Span<const Vec3> outline, Vec3* a_out, Vec3* b_out) {
   }
 }
 
-/// Edges beside the road by the square cells that they touch; crosswalks cut and add edges.
+/// Index of the walkways' edges by the square cells that they touch. It is updated when crosswalks split and add edges.
 class EdgeCells {
  public:
   explicit EdgeCells(const Network& network) {
     for (size_t i = 0; i < network.edges.size(); ++i) add(network, i);
   }
 
-  /// Adds an edge piece by piece, so that long edges are in few cells.
+  /// Adds an edge in pieces, so that a long diagonal edge is added to few cells.
   void add(const Network& network, size_t edge) {
     const Vec2 a = network.at(network.edges[edge].a).xy(), way = network.at(network.edges[edge].b).xy() - a;
     const int pieces = 1 + static_cast<int>(length(way) / kCell_m);
@@ -129,7 +129,7 @@ class EdgeCells {
     }
   }
 
-  /// Returns all edges within reach of p, and possibly others, in ascending order.
+  /// Returns all edges within kReach_m of p, and possibly farther edges, in ascending order.
   const std::vector<size_t>& near(Vec2 p) {
     found_.clear();
     visit(p.x - kReach_m, p.x + kReach_m, p.y - kReach_m, p.y + kReach_m, [&](uint64_t cell) {
@@ -142,7 +142,7 @@ class EdgeCells {
   }
 
  private:
-  static constexpr float kReach_m = kCrossingReach_m + 1, kCell_m = 2 * kReach_m;  // with room for rounding
+  static constexpr float kReach_m = kCrossingReach_m + 1, kCell_m = 2 * kReach_m;  // with a margin for rounding
 
   template <typename Visit>
   static void visit(float low_x, float high_x, float low_y, float high_y, Visit&& visit_cell) {
@@ -158,8 +158,8 @@ class EdgeCells {
   std::vector<size_t> found_;
 };
 
-/// Returns the node beside the road nearest to p, cutting an edge if the place lies between nodes; -1 if none is within
-/// reach.
+/// Returns a node at the point of the walkways nearest to p, or -1 if no point is within kCrossingReach_m. If the point
+/// is between two nodes, splits the edge there.
 int32_t node_near(Vec3 p, Network* network_inout, EdgeCells* cells_inout) {
   const size_t num_edges = network_inout->edges.size();
   size_t nearest = num_edges;
@@ -208,7 +208,7 @@ void add_crosswalks(const RoadMap& map, Network* out) {
   }
 }
 
-/// Drops networks without destinations.
+/// Removes connected networks that are too short for routes.
 void drop_short_networks(Network* out) {
   std::vector<int32_t> root(out->nodes.size());
   std::iota(root.begin(), root.end(), 0);

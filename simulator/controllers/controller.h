@@ -1,4 +1,5 @@
-// Common interface of everything that commands agents: random and idle controllers, lane keeping, policies, logs.
+// Common interface of controllers, which command agents: random and idle controllers, lane keeping, policies,
+// recordings.
 #pragma once
 
 #include <string_view>
@@ -9,7 +10,8 @@
 
 namespace pictura {
 
-/// Chooses a command for every slot. A controller belongs to one simulator and works in that simulator's memory.
+/// Chooses a command for every slot. A controller belongs to one simulator and works in the memory of the simulator's
+/// device.
 class Controller {
  public:
   Controller() = default;
@@ -19,11 +21,11 @@ class Controller {
 
   virtual std::string_view name() const = 0;
 
-  /// Writes commands_out [slots] for the step after the state in `input`. Commands of slots with mask [slots] 0 are
-  /// left unchanged, so that controllers can share a simulator; an empty mask commands all slots. Commands of inactive
-  /// agents have no meaning. On a device, all arrays lie on the device, and work is put on the stream without waiting
-  /// or allocating; a CUDA graph can capture it, unless the name ends in "on the host". On the host the call is
-  /// synchronous. Throws Error when an array's size differs from the simulator's number of slots.
+  /// Writes commands_out [slots] for the step that follows the state in `input`. Commands of slots whose element of
+  /// mask [slots] is 0 stay unchanged, so that several controllers can share a simulator; an empty mask selects all
+  /// slots. Commands of inactive agents have no meaning. In host memory, the call is synchronous. In device memory, the
+  /// call puts work on the stream without waiting or allocating, and a CUDA graph can capture it, unless name() ends in
+  /// "on the host". Throws Error if the size of an array differs from the simulator's number of slots.
   virtual void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
                    Stream stream = {}) = 0;
 };

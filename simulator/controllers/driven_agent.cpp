@@ -24,7 +24,8 @@ int32_t DrivenAgent::speed_action(const Motion& from, float wanted_mps) const {
   LongitudinalMotion along{from.speed_mps, from.accel_long_mps2};
   if (wanted_mps == 0 && std::fabs(from.speed_mps) < kSlow_mps) return halt(along, kStepsToHalt).action;
   const float wanted_mps2 = std::clamp((wanted_mps - from.speed_mps) / kReaction_s, -kBraking_mps2, kAccelerating_mps2);
-  // The rounding residue of an acceleration would first be stopped at zero, by all opposing jerks alike.
+  // An acceleration that is not 0 only by rounding would make all opposite jerks end at 0 (see stop_at_zero()), so it
+  // is cleared.
   if (std::fabs(along.accel_mps2) < 1e-3f) along.accel_mps2 = 0;
   int32_t best = kStraight;
   float minimum = INFINITY;
@@ -37,7 +38,8 @@ int32_t DrivenAgent::speed_action(const Motion& from, float wanted_mps) const {
   return best;
 }
 
-/// Searches `steps` steps ahead for a halt, because jerks are too coarse to come to rest by decreasing accelerations.
+/// Searches `steps` steps ahead for actions that bring the agent to rest. A rule without search does not suffice,
+/// because the jerks of actions are too coarse.
 DrivenAgent::Halt DrivenAgent::halt(LongitudinalMotion from, int steps) const {
   constexpr float kPerAcceleration_s = 0.3f;
   if (steps == 0) return {kStraight, kPerAcceleration_s * std::fabs(from.accel_mps2)};

@@ -1,32 +1,32 @@
-// An agent that a controller drives, by its world's own rules: the motions that result from actions, and whether they
-// leave the road.
+// An agent that a controller drives. The class predicts the agent's motion after actions with the rules of its world,
+// and tests whether a motion leaves the road.
 #pragma once
 
 #include "pictura/simulator/rules/step.h"
 
 namespace pictura {
 
-/// A vehicle or cyclist.
+/// A vehicle or cyclist that a controller drives.
 class DrivenAgent {
  public:
-  /// The view's arrays must outlive this object, and the agent's body must not change.
+  /// The arrays of `world` must outlive this object. The agent's class and size must not change.
   DrivenAgent(const WorldView& world, int agent);
 
   Motion now() const { return motion_of(world_.agents, slot_); }
-  /// Motion one step later.
+  /// Returns the motion one step after `from`.
   Motion after(const Motion& from, int32_t action) const;
-  /// Returns the action without lateral jerk that brings the agent nearest to a speed. To steer, add k - kStraight,
-  /// where k is 0, 1 or 2.
+  /// Returns the best action without lateral jerk for reaching a speed. For another lateral jerk, add k - kStraight,
+  /// where k in {0, 1, 2} is the index of the jerk.
   int32_t speed_action(const Motion& from, float wanted_mps) const;
   static constexpr int32_t kStraight = 1;
 
-  /// Box of the agent at a pose, enlarged by a margin on every side.
+  /// Returns the agent's box at a pose, enlarged by a margin on every side.
   AgentBox box(Vec3 axle_m, float heading_rad, float margin_m) const;
   /// Whether the agent's box at this motion and height, enlarged by a margin on every side, is partly off the road.
   bool leaves_road(const Motion& at, float z_m, float margin_m) const;
-  /// Whether the front bumper crosses an exit in a step at this height, which means that the agent leaves the map.
+  /// Whether the front bumper crosses an exit in a step at height z_m. The agent then leaves the map.
   bool crosses_exit(const Motion& before, const Motion& after, float z_m) const;
-  /// Distance from the rear axle to the front bumper.
+  /// Returns the distance from the rear axle to the front bumper.
   float to_bumper_m() const;
   float wheelbase_m() const { return parameters_.wheelbase_m; }
   float dt_s() const { return world_.options.dt_s; }

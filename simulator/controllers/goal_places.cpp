@@ -9,7 +9,7 @@ namespace pictura {
 
 namespace {
 
-/// Whether pedestrians of the largest size touch no wall anywhere along the piece.
+/// Whether a pedestrian of maximum size touches no wall on the whole piece.
 bool is_passable(const MapView& map, const WalkPiece& piece) {
   constexpr float kStep_m = 0.25f;
   const ClassLimits limits = class_limits(AgentClass::pedestrian);
@@ -28,12 +28,13 @@ bool is_passable(const MapView& map, const WalkPiece& piece) {
   return true;
 }
 
-/// Reachability between places of the walkways, along passable pieces.
+/// Reachability between points of walkways along passable pieces.
 class WalkGraph {
  public:
   explicit WalkGraph(const MapView& map) : map_(map), network_(map.walk_leave_begin.size(), -1) {
     for (const WalkPiece& piece : map.walk_pieces) passable_.push_back(is_passable(map, piece));
-    // Every piece has an opposite piece, so that networks are found by spreading from node to node.
+    // Every piece has an opposite piece, so the graph is undirected, and a flood fill from node to node finds connected
+    // networks.
     for (size_t node = 0; node + 1 < map.walk_leave_begin.size(); ++node) {
       if (network_[node] < 0) spread(static_cast<int32_t>(node));
     }
@@ -64,12 +65,12 @@ class WalkGraph {
 
   const MapView map_;
   std::vector<bool> passable_;    // [walk_pieces]
-  std::vector<int32_t> network_;  // [nodes] a node of the same network
+  std::vector<int32_t> network_;  // [nodes] id of the node's network: one of its nodes
 };
 
 bool road_leads(const WorldView& world, const LaneGraph& graph, RoutePoint from, RoutePoint to) {
   const auto route = graph.route(lane_place(world.map, graph, from), lane_place(world.map, graph, to));
-  // The gap itself, except for the different lengths of neighbours.
+  // The route's length equals the gap, except for different lengths of neighbouring lanes.
   return route && route->length_m <= 2 * kMaxWaypointGap_m;
 }
 

@@ -1,4 +1,5 @@
-// Goals of agents, place by place on their lanes and walkways, redrawn from the seed, and whether they can be reached.
+// Waypoints of agents as points on lanes and walkways, and a test whether they can be reached. The waypoints are
+// recomputed from the seed, because the state stores only their coordinates.
 #pragma once
 
 #include <array>
@@ -9,23 +10,25 @@
 
 namespace pictura {
 
-/// Returns the place of an agent at the start of its life; the agent must be present and not have moved yet.
+/// Returns the point on the lane network (or walkways) at which the agent's life started. The agent must be present and
+/// must not have moved yet.
 RoutePoint start_place(const WorldView& world, int agent);
 
-/// Returns the waypoints of chain `chain` of the agent's life, which starts at `from`.
+/// Returns the waypoints of chain `chain` of the agent's life. The chain starts at `from`.
 std::array<RoutePoint, kNumWaypoints> goal_places(const WorldView& world, int agent, uint32_t chain, RoutePoint from);
 
-/// Converts `at` to a place on the graph's lanes, whose lengths differ by rounding from those of the map's rules.
+/// Converts `at` to a position on the lane graph. The lengths of its lanes differ by rounding errors from those of the
+/// map's rules.
 LanePosition lane_place(const MapView& map, const LaneGraph& graph, RoutePoint at);
 
 struct GoalReach {
   int64_t agents = 0, waypoints = 0, unreachable = 0;
 };
 
-/// Follows the first `chains` chains of every present agent of a world before its first step: vehicles and cyclists
-/// (first) and pedestrians (second). A waypoint on a road counts as reached if the lane graph has a route to it from
-/// the previous waypoint, along lanes on which endless routes start. A waypoint on a walkway counts as reached if
-/// pieces of walkways lead to it, with the widest pedestrian clear of walls, and no wall or parked car covers it.
+/// Tests the first `chains` chains of every active agent of a world before its first step. Element 0 of the result
+/// counts vehicles and cyclists, element 1 pedestrians. A waypoint on a lane is reachable if the lane graph has a route
+/// of at most 120 m to it from the previous waypoint. A waypoint on a walkway is reachable if pieces of walkways lead
+/// to it on which a pedestrian of maximum size touches no wall, and if no wall or parked car covers it.
 std::array<GoalReach, 2> follow_goals(const WorldView& world, const LaneGraph& graph, uint32_t chains);
 
 }  // namespace pictura

@@ -45,7 +45,7 @@ class RandomController final : public Controller {
   uint64_t seed_;
 };
 
-/// Gives every slot the same command, by a rule without settings; `name` is a literal.
+/// Controller whose commands come from a default-constructed Rule. `name` must be a string literal.
 template <typename Rule>
 class RuleController final : public Controller {
  public:

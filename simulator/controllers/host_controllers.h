@@ -1,4 +1,4 @@
-// Controllers that run on the host, by name.
+// Makes controllers that run on the host, by their names.
 #pragma once
 
 #include <memory>
@@ -11,27 +11,29 @@
 
 namespace pictura {
 
-/// Names of controllers for towns: "random", "idle" (no jerk), "lane" (the lane keeper, see lane_keeping.h),
-/// "idm_lanes" (along lanes, behind other road users, see idm.h).
+/// Names of controllers for maps without a record: "random", "idle" (actions without jerk), "lane" (the lane keeper,
+/// see lane_keeping.h), "idm_lanes" (intelligent driver model along lanes, see idm.h).
 std::vector<std::string> town_controller_names();
-/// Names of controllers that follow a recorded scene: "log" (as recorded), "inverse" (by the actions that follow the
-/// recording, see inverse_actions.h), "idm" (along recorded paths, see idm.h). On towns, "idm" is "idm_lanes".
+/// Names of controllers for recorded scenes: "log" (agents follow their records), "inverse" (actions that approximate
+/// the records, see inverse_actions.h), "idm" (intelligent driver model along recorded paths, see idm.h). On maps
+/// without a record, "idm" is the same as "idm_lanes".
 std::vector<std::string> record_controller_names();
 /// Names of all host controllers.
 std::vector<std::string> host_controller_names();
-/// Whether a controller runs on the host wherever the simulator's memory lies: "lane", "idm" and "idm_lanes" do.
+/// Whether a controller runs on the host even if the simulator runs on a device: true for "lane", "idm" and
+/// "idm_lanes".
 bool drives_on_host(std::string_view name);
 
-/// Throws UsageError naming the first unsuitable world: "log" and "inverse" need a map with a record, and "lane" needs
-/// a map without one, because recorded lanes end.
+/// Throws UsageError if the controller cannot drive in a world; the message names the first such world. "log" and
+/// "inverse" need a map with a record. "lane" needs a map without a record, because lanes of recorded scenes end.
 void check_worlds(std::string_view controller, const Simulator& simulator);
 
-/// Makes a controller. Throws UsageError listing the known names, or Error if the simulator's memory is not on the
-/// host.
+/// Makes a controller. Throws UsageError, which lists the known names, for an unknown name. Throws Error if the
+/// simulator does not work in host memory.
 std::unique_ptr<Controller> make_host_controller(const std::string& name, const Simulator& simulator, uint64_t seed);
 
-/// Throws Error naming the controller unless `commands`, and the mask if it is not empty, have one element per slot and
-/// the input lies on `device`.
+/// Throws Error, which names the controller `who`, unless `commands` has one element per slot, the mask has one element
+/// per slot or is empty, and `input` is in the memory of `device`.
 void check_controller_arrays(std::string_view who, const SimulatorArrays& input, Device device,
                              Span<const uint8_t> mask, Span<const Command> commands);
 

@@ -22,7 +22,7 @@ FollowedPath path_of(const MapRecord& record, size_t agent) {
   return path;
 }
 
-/// Returns the drivable lane after a lane that turns least; -1 if there is none.
+/// Returns the successor of a lane that turns least; -1 if there is none.
 int32_t straightest_after(const MapView& map, int32_t lane_index) {
   const MapLane& lane = map.lanes[lane_index];
   const int32_t count = lane.num_successors > 0 ? lane.num_successors : lane.num_all_successors;
@@ -41,7 +41,7 @@ int32_t straightest_after(const MapView& map, int32_t lane_index) {
   return best;
 }
 
-/// Returns the place on the lane's centre line nearest to p, and its distance.
+/// Returns the point of the lane's centre line nearest to p, and its distance from p.
 RoutePoint nearest_on_lane(const MapView& map, int32_t lane_index, Vec2 p, float* apart_m_out) {
   const MapLane& lane = map.lanes[lane_index];
   RoutePoint nearest{lane_index, 0};
@@ -56,14 +56,15 @@ RoutePoint nearest_on_lane(const MapView& map, int32_t lane_index, Vec2 p, float
   return nearest;
 }
 
-/// Returns the lane of the point or, if it has no successors, the nearest lane beside it that has some.
+/// Returns the lane of the point or, if it has no successors, the nearest lane beside it that has successors.
 int32_t lane_to_follow(const MapView& map, RoutePoint at) {
   return map.lanes[at.lane].num_all_successors > 0 ? at.lane : through_lane(map, at).lane;
 }
 
-/// Moves a point to the place nearest to p on the lane to follow. Returns the distance along that lane over which a
-/// path from p reaches its centre line: before the end of the point's own lane, if the path leaves it. Without room for
-/// that, the point moves along its own lane until the front is before its end, and nothing is returned.
+/// Starts a path from p along the lane to follow, see lane_to_follow(). Moves the point *at_inout to the point of that
+/// lane nearest to p, and returns the distance along the lane over which the path reaches its centre line. If the path
+/// leaves the point's own lane, it does so before the end of that lane. If there is no room for this, returns nullopt,
+/// and moves the point along its own lane until the front bumper is just before the lane's end.
 std::optional<float> merge(const MapView& map, Vec2 p, float front_m, RoutePoint* at_inout) {
   constexpr float kMinMerge_m = 6, kMergePerMetre = 4;  // per metre of distance from the centre line
   constexpr float kBeforeEnd_m = 0.5f;
@@ -193,7 +194,8 @@ void IdmController::act(const SimulatorArrays& input, Span<const uint8_t> mask, 
   }
 }
 
-/// Returns the agent's place on its path. A path along lanes is rebuilt if the agent was moved or the path runs out.
+/// Returns the agent's arc length on its path. A path along lanes is rebuilt if the agent was moved away from it or its
+/// end is near.
 float IdmController::place_on_path(const SimulatorArrays& input, size_t slot) {
   constexpr float kOffPath_m = 1, kLeast_m = 60;
   const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
@@ -248,7 +250,8 @@ IdmController::Front IdmController::box_ahead(const SimulatorArrays& input, size
   return {};
 }
 
-/// Distance from the bumper to the first line along the path that stops the agent; infinite if there is none.
+/// Returns the distance along the path from the front bumper to the first stop line that stops the agent; infinite if
+/// there is none.
 float IdmController::closed_line_ahead_m(const SimulatorArrays& input, size_t slot, float s_m) const {
   constexpr float kLookahead_m = 45;
   const FollowedPath& path = paths_[slot];

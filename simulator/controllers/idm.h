@@ -1,5 +1,5 @@
-// Intelligent driver model along recorded paths or along lanes. Traffic follows its path and stops behind obstacles in
-// its way. Host only.
+// Intelligent driver model (IDM): agents follow recorded paths or lanes, and keep a distance to obstacles on their
+// path. Runs only on the host.
 #pragma once
 
 #include <cmath>
@@ -13,8 +13,8 @@
 
 namespace pictura {
 
-/// Parameters of the model of Treiber, Hennecke and Helbing, Congested traffic states in empirical observations and
-/// microscopic simulations (2000). The values are those of Waymax's waypoint-following agents.
+/// Parameters of the IDM (Treiber, Hennecke and Helbing, Congested traffic states in empirical observations and
+/// microscopic simulations, 2000). The values are those of Waymax's waypoint-following agents.
 struct IdmParameters {
   float wanted_mps = 30;
   float min_gap_m = 2;
@@ -24,10 +24,12 @@ struct IdmParameters {
   float look_ahead_m = 10;
 };
 
-/// Acceleration for a gap to the road user in front (infinite: none) and the speed of that road user.
+/// Returns the acceleration for a gap to the road user in front, who drives at front_mps. An infinite gap means that
+/// there is nobody in front.
 float idm_acceleration(const IdmParameters& parameters, float speed_mps, float gap_m, float front_mps);
 
-/// Path of an agent: places of its reference point, each at least kMinPiece_m from the previous place, with headings.
+/// Path of an agent: positions of its reference point with headings. Each position is at least kMinPiece_m from the
+/// previous position.
 struct FollowedPath {
   static constexpr float kMinPiece_m = 0.5f;
   std::vector<Vec3> points_m;
@@ -35,11 +37,10 @@ struct FollowedPath {
   std::vector<float> s_m;  // arc length along the path
   bool ends = true;        // false: lanes continue beyond the path
 
-  /// Adds a place, unless it is too near to the last place.
+  /// Adds a position, unless it is less than kMinPiece_m from the last position.
   void add(Vec3 point_m, float its_heading_rad);
   float length_m() const { return s_m.back(); }
-  /// Returns the arc length of the place nearest to p, on the pieces from `from_s_m` on, including a piece that ends
-  /// just before `from_s_m`.
+  /// Returns the arc length of the path's point nearest to p. Searches the path from about `from_s_m` on.
   float nearest_m(Vec2 p, float from_s_m) const;
   struct Pose {
     Vec3 position_m;
@@ -48,23 +49,23 @@ struct FollowedPath {
   Pose at(float s_m) const;
 };
 
-/// Returns a path from a pose onto the centre line of the lane and along the lanes that follow, for kAhead_m or to the
-/// end of the lanes. The path takes the straightest way at forks. After endless lanes, only endless lanes follow. At a
-/// lane without successors, the path changes to the nearest lane beside it with successors. If there is no room for the
-/// change, the path ends where the front bumper, front_m ahead of the reference point, is before the lane's end.
-/// Without a lane (-1), the path is the pose alone.
+/// Returns a path from a pose to the centre line of the lane and along the following lanes, for 200 m or to the end of
+/// the lanes. At a fork, the path takes the straightest successor among those on which routes may continue
+/// (MapLane::num_successors), if there are any. At a lane without successors, the path changes to the nearest lane
+/// beside it that has successors. If there is no room for the change, the path ends where the front bumper, front_m
+/// ahead of the reference point, is still before the lane's end. If `lane` is -1, the path consists of the pose alone.
 FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m, float heading_rad, float front_m);
 
 enum class IdmPaths {
-  logged,  // recorded paths; without a record, as in towns, along lanes
+  logged,  // along recorded paths; on maps without a record, along lanes
   lanes,   // along lanes for all vehicles and cyclists
 };
 
-/// Moves every commanded agent along its path by kinematic states. The speed follows the model behind the first box
-/// that the agent's box would touch within look_ahead_m of the path. The motion starts from the agent's current place
-/// and speed, and stops at the path's end. Along lanes, the lane's limit bounds the desired speed. A line with a red
-/// light, or with a yellow light before which the agent can still brake, counts as a standing box. Pedestrians without
-/// a record stand still.
+/// Moves every commanded agent along its path with kinematic_state commands. The model's road user in front is the
+/// first box that the agent's box would touch on the next look_ahead_m of its path. An agent continues from its current
+/// position and speed, and stops at the end of its path. Along lanes, the desired speed is at most the lane's speed
+/// limit. Stop lines are standing obstacles if their light is red, or if it is yellow and the agent can still brake.
+/// Pedestrians without a record stand still.
 class IdmController final : public Controller {
  public:
   explicit IdmController(const Simulator& simulator, IdmPaths paths = IdmPaths::logged,
@@ -86,11 +87,11 @@ class IdmController final : public Controller {
   IdmPaths wanted_paths_;
   IdmParameters parameters_;
   float dt_s_;
-  std::vector<std::shared_ptr<const CompiledMap>> maps_;  // own the arrays of the views
+  std::vector<std::shared_ptr<const CompiledMap>> maps_;  // keeps the arrays of views_ alive
   std::vector<MapView> views_;                            // [worlds]
   std::vector<FollowedPath> paths_;                       // [slots]
   std::vector<uint8_t> on_lanes_;                         // [slots] whether the agent's path is along lanes
-  std::vector<float> progress_m_;                         // [slots] at the last act(); the next search starts there
+  std::vector<float> progress_m_;                         // [slots] progress along the path at the last act()
   std::vector<int32_t> life_;                             // [slots] life of the agent at the last act()
 };
 

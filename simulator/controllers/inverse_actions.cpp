@@ -14,17 +14,18 @@
 namespace pictura {
 namespace {
 
-/// A sequence of actions: its last action, and its predecessor in the beam of the previous step.
+/// A sequence of actions, stored as its last action and its predecessor in the beam of the previous step.
 struct Sequence {
   Motion motion;
   double cost = 0;            // sum over all steps
-  double predicted_cost = 0;  // including the cost of returning to the record
+  double predicted_cost = 0;  // cost plus the cost of returning to the record
   float error_m = 0;
   int32_t action = 0;
   int32_t before = -1;
 };
 
-/// Key of similarity: of sequences that lead to about the same motion, the cheapest is kept, so that a beam is diverse.
+/// Key of a motion. Sequences whose motions have the same key are similar; only the cheapest of them is kept, so that
+/// the beam is diverse.
 auto similarity_key(const Motion& motion) {
   const auto rounded = [](float value, float unit) { return static_cast<int32_t>(std::lround(value / unit)); };
   return std::tuple(rounded(motion.x_m, 0.02f), rounded(motion.y_m, 0.02f), rounded(motion.heading_rad, 0.01f),
@@ -41,14 +42,15 @@ double cost_of(const Motion& motion, const RecordedState& wanted, float* error_m
          kAccelWeight * (squared(motion.accel_long_mps2) + squared(motion.accel_lat_mps2));
 }
 
-/// A recorded state, with the velocity and acceleration of the surrounding places.
+/// A recorded state, with velocity and acceleration estimated from the surrounding positions.
 struct Target {
   RecordedState state;
   Vec2 velocity_mps, accel_mps2;
 };
 
 Target target_at(Span<const RecordedState> run, size_t i, float dt_s) {
-  constexpr size_t kVelocitySteps = 3, kAccelSteps = 6, kMinAccelSteps = 3;  // to both sides, because records are rough
+  constexpr size_t kVelocitySteps = 3, kAccelSteps = 6, kMinAccelSteps = 3;  // before and after the step; many, because
+                                                                             // records are noisy
   const auto place = [&](size_t step) { return run[step].position_m.xy(); };
   const size_t room = std::min(i, run.size() - 1 - i);
   Target target{.state = run[i]};
@@ -65,9 +67,10 @@ Target target_at(Span<const RecordedState> run, size_t i, float dt_s) {
   return target;
 }
 
-/// Cost of returning to the record from the errors of place, velocity and acceleration: the minimum integral of squared
-/// distances over time, in steps, of a point with controlled jerk and bandwidth kBandwidth. Without this cost, a beam
-/// of short-sighted sequences oscillates about the record, more for longer vehicles.
+/// Returns the predicted cost of returning to the record from errors of position, velocity and acceleration. It is the
+/// minimum sum of squared distances over future steps for a point whose jerk is controlled with bandwidth
+/// kBandwidth_radps. Without this cost, the search is short-sighted and its paths oscillate about the record,
+/// especially for long vehicles.
 double cost_of_return(const Motion& motion, const Target& target, float dt_s) {
   constexpr double kBandwidth_radps = 2;
   constexpr double s1 = 1 / kBandwidth_radps, s2 = s1 * s1, s3 = s2 * s1, s4 = s3 * s1, s5 = s4 * s1;
@@ -82,7 +85,7 @@ double cost_of_return(const Motion& motion, const Target& target, float dt_s) {
          static_cast<double>(dt_s);
 }
 
-/// Returns the beam of the next step, over all actions.
+/// Extends the sequences of a beam by all actions and returns the beam of the next step.
 std::vector<Sequence> next_beam(const std::vector<Sequence>& beam, const Target& target,
                                 const DynamicsParameters& parameters, const ClassLimits& limits, float dt_s) {
   std::map<decltype(similarity_key(Motion{})), Sequence> best;
@@ -106,7 +109,7 @@ std::vector<Sequence> next_beam(const std::vector<Sequence>& beam, const Target&
   return all;
 }
 
-/// Writes the actions of an unbroken run of states to the elements of `out` from `first` on.
+/// Writes the actions for a run of consecutive recorded states to the elements of `out` from `first` on.
 void follow_run(Span<const RecordedState> run, const RecordedAgent& agent, const DynamicsRules& rules, float dt_s,
                 size_t first, InverseActions* out) {
   DynamicsParameters parameters;

@@ -9,14 +9,14 @@ namespace pictura {
 
 namespace {
 
-// Values that are comfortable for a person who watches from above with 0.1 s of delay.
+// Values that are comfortable for a person who views the scene from above with a delay of 0.1 s.
 constexpr float kForward_mps2 = 2.5f, kBackward_mps2 = -4.0f, kReverse_mps2 = -1.5f, kStop_mps2 = 8.0f;
 constexpr float kMaxTurn_mps2 = 3.0f, kTurnAtRest_mps2 = 0.3f, kTurnPerSpeed_per_s = 0.35f;
 constexpr float kRestSpeed_mps = 0.3f;
 
 float wanted_long(const DrivingKeys& keys, float speed_mps) {
   if (keys.stop) {
-    // The maximum braking that the highest jerk can release by the time that the agent stands.
+    // The maximum braking that the highest jerk can reduce to 0 before the agent comes to rest.
     const float release_mps3 = controls_of_action(kNumActions - 1).jerk_long_mps3;
     const float braking = std::min(kStop_mps2, std::sqrt(2 * release_mps3 * std::fabs(speed_mps)));
     return speed_mps > 0 ? -braking : braking;
@@ -32,8 +32,8 @@ float wanted_lat(const DrivingKeys& keys, float speed_mps) {
   return keys.left ? turn : -turn;
 }
 
-// Distance of an acceleration from `wanted` after a step with this jerk. The acceleration stops at zero on its way
-// (rules/dynamics.h).
+// Returns the difference between `wanted` and the acceleration after a step with this jerk. An acceleration whose sign
+// would change becomes 0 (rules/dynamics.h).
 float miss(float from, float jerk_mps3, float dt_s, float wanted) {
   return std::fabs(stop_at_zero(from, from + jerk_mps3 * dt_s, -1e6f, 1e6f) - wanted);
 }

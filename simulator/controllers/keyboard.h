@@ -1,4 +1,4 @@
-// Manual driving: the mapping from keys to actions of the policy's space.
+// Manual driving: the mapping from pressed keys to actions.
 #pragma once
 
 #include <cstdint>
@@ -7,17 +7,17 @@
 
 namespace pictura {
 
-/// State of the keys. Without a key, the agent keeps its speed and straightens.
+/// Pressed keys. If no key is pressed, the agent keeps its speed and straightens its steering.
 struct DrivingKeys {
   bool forward = false;   // accelerates
-  bool backward = false;  // brakes, and at rest starts to reverse
-  bool stop = false;      // brakes at the maximum, and stays at rest
+  bool backward = false;  // brakes; at rest, starts to reverse
+  bool stop = false;      // brakes as hard as possible; stays at rest
   bool left = false, right = false;
   bool operator==(const DrivingKeys&) const = default;
 };
 
-/// Returns the action after which, at the end of a step of dt_s, the slot's acceleration is nearest to the keys'
-/// request.
+/// Returns the action that brings the accelerations of the agent in `slot` nearest to those that the keys request,
+/// after a step of dt_s.
 int32_t action_of_keys(const DrivingKeys& keys, const AgentStateView& state, int slot, float dt_s);
 
 }  // namespace pictura

@@ -13,7 +13,7 @@ namespace pictura {
 
 namespace {
 
-constexpr float kWayOn_m = 80;   // beyond the last waypoint
+constexpr float kWayOn_m = 80;   // length of the path beyond the last waypoint
 constexpr float kMissed_m = 10;  // a waypoint this far behind has been missed
 constexpr float kStanding_mps = 0.1f;
 
@@ -70,9 +70,9 @@ int32_t LaneKeepingAgent::act() {
   return action;
 }
 
-/// Updates the plan, and returns whether the resulting action keeps the agent on the road. No plan is made while
-/// pursuing the path suffices. At least half of a plan is followed. A halted agent searches from its place, each time
-/// with twice as many nodes, until a search has tried everything there.
+/// Updates the plan and returns whether the next action keeps the agent on the road. If the agent stays on the road by
+/// following its path, there is no plan. A plan is replaced only after half of it. A halted agent searches with twice
+/// the budget after each failed search, until a search fails although it does not use up its budget.
 bool LaneKeepingAgent::renew_plan(const Motion& now) {
   if (stays_on_road(now, action_of(Driving::pursues, now, place_), Driving::pursues)) {
     drop_plan();
@@ -102,7 +102,7 @@ void LaneKeepingAgent::drop_plan() {
   next_planned_ = 0;
 }
 
-/// Continues to the waypoints of a new chain, or back to a missed waypoint.
+/// Extends the path to the waypoints of a new chain, or replaces it if the agent missed a waypoint.
 void LaneKeepingAgent::follow_goals() {
   const int32_t chain = world_.agents.goal_chains[slot_] - 1;
   PICTURA_CHECK(chain <= chain_ + 1, "lane keeping: expected consecutive goal chains, got {} after {}", chain, chain_);
@@ -117,22 +117,23 @@ void LaneKeepingAgent::follow_goals() {
   }
 }
 
-/// Extends the path from its end through the remaining waypoints, and beyond.
+/// Extends the path from its end through the remaining waypoints and kWayOn_m beyond.
 void LaneKeepingAgent::plan() {
   for (auto i = static_cast<size_t>(world_.agents.next_waypoint[slot_]); i < kNumWaypoints; ++i) {
     const bool gets_there = path_.go_to(waypoints_[i]);
     for (size_t goal = i; goal < kNumWaypoints; ++goal) goals_[goal] = points().size() - 1;
     if (!gets_there) break;
   }
-  // The way after the last waypoint is unknown, and the agent must be able to turn there.
+  // The next chain is unknown, so the agent must be slow enough to turn after the last waypoint.
   constexpr float kTurn_m = 20, kTurning_mps = 3;
   const bool may_turn = path_.forks_within(kTurn_m);
   path_.go_on(kWayOn_m);
   path_.limit_speeds(goals_.back(), may_turn ? kTurning_mps : INFINITY);
 }
 
-/// Replaces a turn that cannot be taken: if the straightest way is clear, it becomes the path, and its plan is
-/// returned; else `plan` is returned. The path to the waypoints continues from there.
+/// Tries another path if a turn cannot be driven. If there is a clear plan along the straightest lanes, these become
+/// the path and that plan is returned; otherwise `plan` is returned. The path later continues from there to the
+/// waypoints.
 DrivingPlan LaneKeepingAgent::plan_elsewhere(DrivingPlan plan) {
   constexpr float kPassed_m = 20;
   LanePath other = path_;
@@ -150,7 +151,7 @@ size_t LaneKeepingAgent::ahead(size_t from, float distance_m) const {
   return std::min(from + static_cast<size_t>(distance_m / LanePath::kSpacing_m), points().size() - 1);
 }
 
-/// Moves the agent's place along the path to the point nearest to the rear axle.
+/// Moves place_ forward to the point of the path nearest to the rear axle.
 void LaneKeepingAgent::find_place() {
   constexpr float kReach_m = 3;
   const Motion now = agent_.now();
@@ -165,7 +166,8 @@ void LaneKeepingAgent::find_place() {
   steps_off_path_ += best_m > kOffPath_m;
 }
 
-/// Pure pursuit (Coulter, Implementation of the pure pursuit path tracking algorithm, 1992) from a place on the path.
+/// Returns the steering angle of pure pursuit from point `place` of the path (Coulter, Implementation of the pure
+/// pursuit path tracking algorithm, 1992).
 float LaneKeepingAgent::steer_to(const Motion& now, size_t place) const {
   const Vec2 target = points()[ahead(place, std::clamp(2 + 0.6f * now.speed_mps, 2.0f, 10.0f))].position_m.xy();
   const SinCos heading = sincos_of(now.heading_rad);
@@ -180,8 +182,8 @@ int32_t LaneKeepingAgent::pursuing_action(const Motion& now, size_t place, float
   int32_t best = straight;
   float minimum = INFINITY;
   for (const int32_t side : {-1, 0, 1}) {
-    // An acceleration that changes its sign stops at zero for one step, so that steering takes effect only in the
-    // second step.
+    // A lateral acceleration that changes its sign is 0 for one step, so an action may take effect only in the second
+    // step.
     const Motion next = agent_.after(agent_.after(now, straight + side), straight + side);
     const float off = std::fabs(next.steer_rad - wanted_rad);
     if (off >= minimum) continue;
@@ -196,8 +198,8 @@ int32_t LaneKeepingAgent::action_of(Driving how, const Motion& now, size_t place
   return pursuing_action(now, place, how == Driving::pursues ? points()[place].speed_mps : 0);
 }
 
-/// Whether this action, followed by driving in this way, keeps the agent on the road by a margin until it has covered
-/// the horizon, stands after braking, or has left through an exit.
+/// Whether the agent stays on the road, with a margin, if it takes this action and then drives as `how` says. The
+/// prediction ends at the horizon, when the agent has braked to rest, or when it has left through an exit.
 bool LaneKeepingAgent::stays_on_road(Motion now, int32_t action, Driving how) const {
   constexpr float kHorizon_m = 20;
   const float margin_m = how == Driving::pursues ? 0.1f : 0.02f;
@@ -215,24 +217,25 @@ bool LaneKeepingAgent::stays_on_road(Motion now, int32_t action, Driving how) co
   return true;
 }
 
-/// Whether the agent can still stop on the road after this action.
+/// Whether the agent can stop without leaving the road after this action.
 bool LaneKeepingAgent::can_stop_after(const Motion& now, int32_t action) const {
   return stays_on_road(now, action, Driving::brakes) || stays_on_road(now, action, Driving::brakes_straight);
 }
 
-/// Returns an action that stops the agent on the road, if possible.
+/// Returns an action that brakes and, if possible, keeps the agent on the road.
 int32_t LaneKeepingAgent::braking_action(const Motion& now) const {
   const int32_t action = action_of(Driving::brakes, now, place_);
   if (stays_on_road(now, action, Driving::brakes)) return action;
   const int32_t straight = action_of(Driving::brakes_straight, now, place_);
   if (stays_on_road(now, straight, Driving::brakes_straight)) return straight;
-  // Jerks are too coarse to stop at zero: a standing agent creeps by millimetres per second, until it must reverse.
+  // Jerks are too coarse for a speed of exactly 0: a stopped agent creeps by millimetres per second, so it must
+  // sometimes reverse.
   constexpr float kBack_mps = 0.5f;
   return std::fabs(now.speed_mps) < kStanding_mps ? agent_.speed_action(now, std::copysign(kBack_mps, -now.speed_mps))
                                                   : action;
 }
 
-/// Speed from which the agent can stop before the next closed line.
+/// Returns the maximum speed from which the agent can stop before the next closed stop line, see to_closed_line().
 float LaneKeepingAgent::speed_before_light(const Motion& now) {
   constexpr float kMargin_m = 2.0f;
   const float gap_m = to_closed_line(now) - kMargin_m;
@@ -240,9 +243,9 @@ float LaneKeepingAgent::speed_before_light(const Motion& now) {
   return std::sqrt(2 * 1.5f * std::max(gap_m, 0.0f));
 }
 
-/// Distance from the bumper along the route to the next line that is red, or yellow with enough distance to stop; 1000
-/// if none is near. Points of the path are too coarse to tell whether the bumper is past a line at which it stands, so
-/// the agent's own place is used there.
+/// Returns the distance along the route from the front bumper to the next closed stop line: one whose light is red, or
+/// yellow with enough distance to stop. Returns 1000 if there is none ahead. At a line near the bumper, the agent's
+/// exact position is used, because the path's points are too coarse to tell whether the bumper is past the line.
 float LaneKeepingAgent::to_closed_line(const Motion& now) const {
   constexpr float kLookahead_m = 45, kAt_m = 1;
   const Vec2 here = points()[place_].position_m.xy();
@@ -275,11 +278,11 @@ float LaneKeepingAgent::to_closed_line(const Motion& now) const {
   return 1000;
 }
 
-/// Speed from which the agent can stop before it would touch another agent on its path: at the current place of the
-/// other agent or, where the other agent has priority, at its expected place.
+/// Returns the maximum speed from which the agent can stop before it touches another agent on its path. If the other
+/// agent has priority, its predicted positions in the next seconds are avoided too.
 float LaneKeepingAgent::speed_behind_others() const {
   constexpr float kLookahead_m = 40, kMargin_m = 0.4f, kGap_m = 2;
-  // Other agents may halt at any time; the agent then brakes hard.
+  // Other agents may halt within one step; the agent then brakes hard.
   constexpr float kBraking_mps2 = 1.5f, kHardBraking_mps2 = 3;
   constexpr float kForesight_s = 4, kStep_s = 0.5f;
   const Motion now = agent_.now();
@@ -315,13 +318,14 @@ float LaneKeepingAgent::speed_behind_others() const {
   return max_mps;
 }
 
-/// Whether the other agent has priority: agents with lower indices do, unless they go the same way.
+/// Whether the other agent has priority: agents with lower indices have priority, unless both have about the same
+/// heading.
 bool LaneKeepingAgent::has_right_of_way(int other) const {
   const float turned = wrap_angle(world_.agents.heading_rad[world_.first_slot + other] - agent_.now().heading_rad);
   return other < self_ && std::fabs(turned) > 0.5f;
 }
 
-/// Whether the agent's path is, or soon will be, between two lanes.
+/// Whether the agent's path changes lanes here or within kSoon_m.
 bool LaneKeepingAgent::is_changing_lane() const {
   constexpr float kSoon_m = 20, kAside_m = 0.3f;
   for (size_t i = place_; i <= ahead(place_, kSoon_m); ++i) {
@@ -330,7 +334,7 @@ bool LaneKeepingAgent::is_changing_lane() const {
   return false;
 }
 
-/// Whether the other agent is behind this one and on its lane.
+/// Whether the other agent is behind this agent on the same lane.
 bool LaneKeepingAgent::follows(const AgentBox& other) const {
   const Motion now = agent_.now();
   const SinCos heading = sincos_of(now.heading_rad);
@@ -359,7 +363,7 @@ void LaneKeepingController::act(const SimulatorArrays& input, Span<const uint8_t
                   input.episode_index[w], input.episode_step[w]);
     if (views_[w]->map.is_open) begin_lives(w);
   }
-  // Agents read the state and write only their own commands.
+  // The loop can run in parallel, because agents only read the state and write only their own commands.
   parallel_for(setup_->config.num_threads, static_cast<int64_t>(episode_.size()), [&](int64_t world) {
     const auto w = static_cast<size_t>(world);
     const auto end = static_cast<size_t>(setup_->slot_begin[w + 1]);
@@ -373,7 +377,7 @@ void LaneKeepingController::act(const SimulatorArrays& input, Span<const uint8_t
 }
 
 void LaneKeepingController::begin_episode(const SimulatorArrays& input, size_t world) {
-  // The view refers to the simulator's agents, boxes and lights, which are only read here.
+  // The view points to the simulator's agents, boxes and lights. This controller only reads them.
   const auto map = static_cast<size_t>(setup_->worlds[world].map);
   WorldView& view =
       views_[world].emplace(setup_->view(static_cast<int>(world), setup_->map_views[map], setup_->options));
@@ -389,7 +393,7 @@ void LaneKeepingController::begin_episode(const SimulatorArrays& input, size_t w
   episode_[world] = input.episode_index[world];
 }
 
-/// Creates the drivers of agents whose life has begun since the last call.
+/// Creates the LaneKeepingAgent of each agent whose life has begun since the last call.
 void LaneKeepingController::begin_lives(size_t world) {
   const WorldView& view = *views_[world];
   const LaneGraph& graph = *graphs_[setup_->worlds[world].map];

@@ -1,7 +1,8 @@
-// The lane keeper: a controller for vehicles and cyclists in traffic. It follows its waypoints, stops at red lights and
-// behind other road users, even if these halt at once, and gives way when it changes lanes. It pursues the path of its
-// lanes. If it would leave the road on this path, since long cars cut corners, it follows a plan that stays on the
-// road; without a plan, it stops. Host only.
+// The lane keeper: a controller for vehicles and cyclists in traffic. An agent drives through its waypoints, stops at
+// red lights and behind other road users, and gives way when it changes lanes. It keeps enough distance to stop even if
+// the road user in front halts within one step. It follows the centre lines of lanes by pure pursuit. Long vehicles cut
+// corners: if the agent would leave the road, it searches a plan that stays on the road; if it finds no plan, it stops.
+// Runs only on the host.
 #pragma once
 
 #include <array>
@@ -23,30 +24,36 @@ struct SimulatorSetup;
 /// Drives one vehicle or cyclist of a world through one life.
 class LaneKeepingAgent {
  public:
-  /// `world` refers to the simulator's agents and lights, which are current at every act(), and must not have been
-  /// stepped in this life yet. The graph is that of the world's map. The arrays of the world and the graph must outlive
-  /// this object. `search_nodes` is the number of search nodes that the slot's previous life did not use.
+  /// Must be called before the first step of the agent's life. `graph` is the lane graph of the world's map. The graph
+  /// and the arrays of `world` must outlive this object; act() reads the current state of agents and lights from them.
+  /// `search_nodes` is the budget of search nodes that remains from the slot's previous life.
   LaneKeepingAgent(const WorldView& world, int agent, const LaneGraph& graph, size_t search_nodes = kMaxSearchNodes);
 
   /// Returns the action for the current state of agents and lights.
   int32_t act();
   int32_t life() const { return life_; }
-  /// Remaining number of nodes for its searches.
+  /// Remaining budget of nodes for searches of plans.
   size_t search_nodes() const { return search_nodes_; }
-  /// Number of steps of waiting at a red light.
+  /// Number of steps in which the agent waited at a red light.
   int stops() const { return stops_; }
-  /// Number of steps with the rear axle more than kOffPath_m from the path.
+  /// Number of steps in which the rear axle was more than kOffPath_m from the path.
   int steps_off_path() const { return steps_off_path_; }
   static constexpr float kOffPath_m = 1;
 
  private:
-  // A node takes 1 to 4 us. Where roads end, an agent's search takes at most 10 ms per step; a few vehicles then find
-  // no way round the tightest ends (docs/research/public_maps.md). In towns, where a way may need 130,000 nodes,
-  // searches take at most 1 ms per step in the mean of a long run, and 0.9 s in a single step.
+  // Computing a search node takes 1 to 4 us. On maps whose roads end, an agent's search takes at most 10 ms per step; a
+  // few vehicles then find no plan for the tightest curves (docs/research/public_maps.md). On other maps, a plan may
+  // need 130,000 nodes. There, the searches of an agent take at most 0.9 s in a single step, and at most 1 ms per step
+  // averaged over a long run.
   static constexpr size_t kMaxSearchNodes = 300'000, kMaxSearchNodesOfOpen = 2'000, kSearchNodesPerStep = 500,
                           kMinSearchNodes = 20'000;
 
-  enum class Driving { pursues, brakes, brakes_straight };  // pursues the path; brakes on it; brakes straight ahead
+  enum class Driving {
+    pursues,
+    brakes,
+    brakes_straight
+  };  // follows the path; brakes on the path; brakes with
+      // straight steering
 
   void follow_goals();
   void plan();
@@ -75,28 +82,29 @@ class LaneKeepingAgent {
   const int32_t life_;
   const DrivenAgent agent_;
   std::array<RoutePoint, kNumWaypoints> waypoints_;
-  int32_t chain_ = -1;  // chain of these waypoints
+  int32_t chain_ = -1;  // index of the goal chain of waypoints_
   LanePath path_;
   size_t place_ = 0;                           // index of the nearest point of the path
-  std::array<size_t, kNumWaypoints> goals_{};  // indices of the waypoints' points on the path
+  std::array<size_t, kNumWaypoints> goals_{};  // indices of the path's points at the waypoints
   DrivingPlan plan_;
-  size_t next_planned_ = 0;  // index into the plan's actions
+  size_t next_planned_ = 0;  // index of the plan's next action
   const size_t max_search_nodes_;
   size_t search_nodes_;
-  size_t min_search_nodes_ = 0;  // minimum of search_nodes_ to begin the next search
-  bool halts_ = false;           // halts before leaving the road, until a way is found
+  size_t min_search_nodes_ = 0;  // minimum budget for beginning the next search
+  bool halts_ = false;           // the agent halts on the road until it finds a plan
   int stops_ = 0, steps_off_path_ = 0;
 };
 
 /// Drives all vehicles and cyclists of a simulator; pedestrians stand still.
 class LaneKeepingController final : public Controller {
  public:
-  /// Reads the simulator's configuration, maps and worlds, on any executor. act() takes host memory.
+  /// Copies the configuration, maps and worlds of a simulator, which may run on any device. The input of act() must be
+  /// in host memory.
   explicit LaneKeepingController(const Simulator& simulator);
   ~LaneKeepingController() override;
 
   std::string_view name() const override { return "lane"; }
-  /// Also throws Error if a world is in the middle of an episode whose first step this controller has not seen.
+  /// Also throws Error if act() was not called before the first step of a world's current episode.
   void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
            Stream stream = {}) override;
   /// Returns null for pedestrians, for absent agents, and before the first act().
@@ -106,10 +114,10 @@ class LaneKeepingController final : public Controller {
   void begin_episode(const SimulatorArrays& input, size_t world);
   void begin_lives(size_t world);
 
-  std::unique_ptr<SimulatorSetup> setup_;                  // a copy, for its maps and rule options
+  std::unique_ptr<SimulatorSetup> setup_;                  // copy of the simulator's maps and options
   std::vector<std::unique_ptr<LaneGraph>> graphs_;         // [maps]
   std::vector<int32_t> episode_;                           // [worlds] episode that agents_ drive, or -1
-  std::vector<std::optional<WorldView>> views_;            // [worlds] views of that episode
+  std::vector<std::optional<WorldView>> views_;            // [worlds] views of the worlds in that episode
   std::vector<std::unique_ptr<LaneKeepingAgent>> agents_;  // [slots]
 };
 

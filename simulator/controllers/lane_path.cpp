@@ -57,7 +57,7 @@ bool LanePath::go_to(RoutePoint to) {
   return false;
 }
 
-/// Returns the lanes to a place, if a route leads there, with every change as early as lanes lie side by side.
+/// Returns the lanes of a route to a point, or nullopt if there is no route. Each lane change is as early as possible.
 std::optional<std::vector<int32_t>> LanePath::route_to(RoutePoint to) const {
   const auto route = graph_->route(lane_place(map_, *graph_, at_), lane_place(map_, *graph_, to));
   if (!route) return std::nullopt;
@@ -77,9 +77,10 @@ std::optional<std::vector<int32_t>> LanePath::route_to(RoutePoint to) const {
   return lanes;
 }
 
-/// Follows a route. Stops and returns false at an optional lane change for which the length is too short.
+/// Extends the path along a route. If there is no room for a lane change that is not forced by the end of a lane, stops
+/// before the change and returns false.
 bool LanePath::follow_route(const std::vector<int32_t>& lanes, RoutePoint to) {
-  constexpr float kMinChange_m = 12;  // per change
+  constexpr float kMinChange_m = 12;  // per lane change
   for (size_t i = 1; i < lanes.size(); ++i) {
     if (!is_change(at_.lane, lanes[i])) {
       follow(lane(at_.lane).length_m);
@@ -102,7 +103,7 @@ void LanePath::go_on(float distance_m) {
   while (distance_m > 0) {
     const RoutePoint through = through_lane(map_, at_);
     if (lane(through.lane).num_successors == 0) {
-      if (lane(at_.lane).route_end_m < kRouteGoesOn_m) follow(lane(at_.lane).length_m);  // to the exit
+      if (lane(at_.lane).route_end_m < kRouteGoesOn_m) follow(lane(at_.lane).length_m);  // up to the exit
       break;
     }
     if (through.lane != at_.lane) change_to(through.lane, lane(through.lane).length_m - through.s_m);
@@ -114,18 +115,18 @@ void LanePath::go_on(float distance_m) {
   }
 }
 
-/// Returns the successors on which endless routes start.
+/// Returns the successors on which a route may continue.
 Span<const int32_t> LanePath::successors_of(int32_t index) const {
   return map_.successors.subspan(lane(index).first_successor, lane(index).num_successors);
 }
 
-/// Turn between the ends of a lane.
+/// Returns the absolute change of heading between the ends of a lane.
 float LanePath::turn_of(int32_t index) const {
   return std::fabs(wrap_angle(pose_on_lane(map_, index, lane(index).length_m).heading_rad -
                               pose_on_lane(map_, index, 0).heading_rad));
 }
 
-/// Returns the successor with the shortest way to `to`; -1 if no way leads there.
+/// Returns the successor with the shortest route to `to`; -1 if there is no route.
 int32_t LanePath::best_successor(RoutePoint to) const {
   int32_t best = -1;
   double minimum = INFINITY;
@@ -138,7 +139,7 @@ int32_t LanePath::best_successor(RoutePoint to) const {
   return best;
 }
 
-/// Begins a change to a neighbouring lane, within length_m where that is drivable.
+/// Begins a change to a neighbouring lane. The change is completed within length_m if that is long enough.
 void LanePath::change_to(int32_t to, float length_m) {
   constexpr float kMin_m = 8, kPerMetreAside = 7;
   const Vec2 here = end().position_m.xy();
@@ -188,7 +189,7 @@ bool LanePath::forks_within(float distance_m) const {
 void LanePath::limit_speeds(size_t slow, float slow_mps) {
   constexpr float kFastest_mps = 8, kShareOfLimit = 0.8f;
   constexpr float kSideways_mps2 = 1.5f, kBraking_mps2 = 1.0f;
-  constexpr size_t kWindow = 4;  // number of points over which a curve is measured
+  constexpr size_t kWindow = 4;  // number of points over which the curvature is measured
   for (size_t i = points_.size(); i-- > 0;) {
     PathPoint& point = points_[i];
     const size_t behind = i - std::min(i, kWindow / 2), ahead = std::min(i + kWindow / 2, points_.size() - 1);

@@ -1,5 +1,5 @@
-// Path of a lane-keeping agent: the centre lines of the lanes through its waypoints, with gradual lane changes, and the
-// speeds at which its curves can be driven.
+// Path of an agent of the lane keeper. The path follows centre lines of lanes through the agent's waypoints, with
+// gradual lane changes. It contains the speeds at which the agent can drive its curves.
 #pragma once
 
 #include <cstddef>
@@ -11,14 +11,14 @@
 
 namespace pictura {
 
-/// A lane change: the lateral offset from the new lane decreases along a smooth step.
+/// A lane change. The lateral offset from the new lane decreases smoothly to 0.
 struct LaneChange {
   float aside_m = 0;   // initial offset to the left of the new lane
   float length_m = 1;  // along the lane
   float done_m = 1;    // completed part of length_m
 
   float aside_now_m() const;
-  float slope() const;  // slope of the way relative to the lane
+  float slope() const;  // change of the offset per metre along the lane
 };
 
 struct PathPoint {
@@ -29,11 +29,12 @@ struct PathPoint {
   float speed_mps = 0;  // maximum
 };
 
-/// Returns the index of the point nearest to a place: the search continues from `from` as long as points get nearer.
+/// Returns the index of a point near place_m: the search starts at `from` and continues as long as the next point is
+/// nearer.
 size_t nearest_point(const std::vector<PathPoint>& path, size_t from, Vec2 place_m);
 
-/// Points every kSpacing_m along the route. `graph` is the graph of the view's map; the graph and the view's arrays
-/// must outlive the path.
+/// Path with a point every kSpacing_m. `graph` must be the lane graph of `map`. The graph and the arrays of `map` must
+/// outlive the path.
 class LanePath {
  public:
   static constexpr float kSpacing_m = 0.5f;
@@ -44,16 +45,16 @@ class LanePath {
 
   /// Removes the points after point `last`.
   void cut(size_t last);
-  /// Extends the path to a place. Returns false if no route leads to the place, or if lane changes lack room even with
-  /// detours; the path is then extended elsewhere.
+  /// Extends the path to a point. Returns false if no route leads there, or if there is no room for the lane changes
+  /// even with detours. The path may then be extended along a wrong route.
   bool go_to(RoutePoint to);
-  /// Extends the path as far as lanes continue, taking the straightest way at forks. From a lane that ends, it changes
-  /// to a lane that continues.
+  /// Extends the path by about distance_m, or to the end of the lanes. It takes the straightest lane at forks, and
+  /// changes from a lane that ends to a lane beside it that continues.
   void go_on(float distance_m);
-  /// Whether a fork lies within this distance of the path's end. The end of a road is not a fork.
+  /// Whether there is a fork within distance_m after the path's end. The end of a road is not a fork.
   bool forks_within(float distance_m) const;
-  /// Sets the speed limit of every point from its curve and, by braking, from the points ahead. Point `slow` has a
-  /// limit of at most slow_mps.
+  /// Sets the maximum speed of every point from the curvature there and from the braking distance to slower points
+  /// ahead. The maximum at point `slow` is at most slow_mps.
   void limit_speeds(size_t slow, float slow_mps);
 
  private:
@@ -72,7 +73,7 @@ class LanePath {
   MapView map_;
   const LaneGraph* graph_;
   std::vector<PathPoint> points_;
-  // End of the path:
+  // State at the end of the path:
   RoutePoint at_;
   LaneChange change_;
   float to_next_m_ = kSpacing_m;

@@ -1,4 +1,4 @@
-// Several controllers that share a simulator's worlds, each for its own slots.
+// Controller that combines several controllers of one simulator, each of which commands its own slots.
 #pragma once
 
 #include <memory>
@@ -10,19 +10,20 @@
 
 namespace pictura {
 
-/// A controller and the slots that it commands: all slots, or those with nonzero mask [slots].
+/// A controller and the slots that it commands: those with a nonzero element of mask [slots], or all slots if the mask
+/// is empty.
 struct Driver {
   std::unique_ptr<Controller> controller;
-  Span<const uint8_t> mask;                 // in the simulator's memory
+  Span<const uint8_t> mask;                 // in the memory of the simulator's device
   std::shared_ptr<const void> mask_memory;  // owner of the mask's memory, if any
 };
 
 /// Makes a driver with a mask on the host.
 Driver driver_of(std::unique_ptr<Controller> controller, std::vector<uint8_t> mask);
 
-/// Runs all drivers in their order: if two drivers command a slot, the later one prevails. act() can be captured in
-/// graphs if that holds for all drivers. The mask of act() excludes further slots; it must be empty if a driver has a
-/// mask of its own.
+/// Calls all drivers in their order. If two drivers command a slot, the command of the later driver prevails. A CUDA
+/// graph can capture act() if it can capture the act() of every driver. The mask of act() must be empty if a driver has
+/// a mask.
 class SharedControl final : public Controller {
  public:
   /// Throws UsageError for an empty list of drivers.

@@ -18,12 +18,12 @@ struct Node {
   float aside_m = 0;  // to the left of the path
   float cost = 0;
   int stride = 0;
-  bool is_out = false;  // through an exit
+  bool is_out = false;  // whether the agent has left through an exit
   size_t parent = 0;
   std::array<int32_t, kStrideSteps> actions{};
 };
 
-/// Key of similar nodes: of nodes of one stride with the same key, only the cheapest is needed.
+/// Key of a node. Nodes with the same key are similar, and only the cheapest of them is expanded.
 uint64_t key_of(const Node& node) {
   constexpr float kAlike_m = 0.15f, kAlike_rad = 0.06f;
   const auto cell = [](float value, float size) {
@@ -63,7 +63,8 @@ class Search {
     nodes_.push_back(node);
   }
 
-  /// Adds nodes that steer to either side for the whole stride or for its first step, or not at all.
+  /// Adds the successors of a node. They differ in the lateral jerk of the next kStrideSteps steps: none, or left or
+  /// right in the first step or in all steps.
   void expand(size_t index) {
     for (const auto& [side, steps] :
          {std::pair<int32_t, size_t>{0, 0}, {-1, 1}, {1, 1}, {-1, kStrideSteps}, {1, kStrideSteps}}) {
@@ -80,7 +81,7 @@ class Search {
     }
   }
 
-  /// Takes a step. Returns false if the step leaves the road or the path.
+  /// Simulates a step. Returns false if the agent leaves the road or is too far from the path.
   bool drive(int32_t action, Node* node_inout) const {
     constexpr float kFarthestAside_m = 3, kMaxAskew_rad = 1.6f;
     constexpr float kMinMargin_m = 0.02f, kMargin_m = 0.2f, kTight = 3;

@@ -1,5 +1,6 @@
-// Search for a drivable way at places where the agent cannot follow its path without leaving the road. The search over
-// the agent's own motions swings out before tight curves and keeps clear of kerbs.
+// Search for a plan (a sequence of actions) with which an agent stays on the road where it would leave the road by
+// following its path. Because the search simulates the agent's motion, plans can swing out before tight curves and
+// avoid kerbs.
 #pragma once
 
 #include <cstddef>
@@ -10,20 +11,20 @@
 
 namespace pictura {
 
-/// Speed to which plans slow down, and number of steps with constant steering.
+/// Maximum speed of plans, and number of steps per search node.
 constexpr float kPlannedSpeed_mps = 2;
 constexpr size_t kStrideSteps = 4;
 
 struct DrivingPlan {
   std::vector<int32_t> actions;  // actions of the coming steps
-  bool is_clear = false;  // clear to the horizon or out through an exit; otherwise it ends where it leaves the road
+  bool is_clear = false;         // the plan stays on the road up to the horizon or an exit
 };
 
-/// Finds the cheapest way along the path from the agent's current motion, at point `place`: with little deviation from
-/// the path and seldom near the edge of the road. Hybrid A* without a heuristic (Dolgov et al., Path planning for
-/// autonomous vehicles in unknown semi-structured environments, 2010): motions are exact, and one of several similar
-/// motions is kept. Subtracts the nodes that it makes from *nodes_left_inout; when none are left, the plan is the
-/// farthest way found.
+/// Finds the cheapest plan along the path from the agent's current motion at point `place` of the path. Deviations from
+/// the path and driving near the edge of the road have a cost. The algorithm is hybrid A* without a heuristic (Dolgov
+/// et al., Path planning for autonomous vehicles in unknown semi-structured environments, 2010): motions are exact, and
+/// of several similar motions only one is kept. *nodes_left_inout is the budget of nodes, from which the number of used
+/// nodes is subtracted. If no clear plan is found, the result is the plan that stays on the road longest.
 DrivingPlan search_steering(const DrivenAgent& agent, const std::vector<PathPoint>& path, size_t place,
                             size_t* nodes_left_inout);
 
