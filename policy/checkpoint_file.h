@@ -1,8 +1,8 @@
-// Checkpoint file: a policy, which sessions read, and all other data that a run needs to continue
+// Format of checkpoint files. A checkpoint contains a policy and all other data that a run needs to continue
 // (training/checkpoint.h). Layout: the eight bytes PICTCKPT, u32 version, u32 byte order mark, u64 length of a JSON
-// header, the header, the data that the header describes, u64 hash (FNV-1a) of all preceding bytes. Version 1 has no
-// hash at its end; its header holds a hash of the data. Only code that reads and writes checkpoints should include this
-// header.
+// header, the header, the data that the header describes, u64 hash (FNV-1a) of all preceding bytes. Files of version 1
+// have no hash at the end; their header contains a hash of the data instead. Only code that reads and writes
+// checkpoints should include this header.
 #pragma once
 
 #include <string>
@@ -16,21 +16,22 @@
 
 namespace pictura {
 
-/// Whether the bytes of a file begin like those of a checkpoint.
+/// Whether the bytes of a file begin like a checkpoint.
 bool is_checkpoint(std::string_view file);
 
-/// Header and data of a checkpoint's bytes. The bytes must outlive the object.
+/// Parsed checkpoint. The bytes of the file must outlive the object.
 struct CheckpointFile {
-  /// Throws Error naming `path` if the bytes are not a checkpoint, are truncated or damaged, or have another version or
-  /// byte order.
+  /// Throws Error, which names `path`, if the bytes are not a checkpoint, are truncated or damaged, or have another
+  /// version or byte order.
   CheckpointFile(std::string_view file, const std::string& path);
 
-  /// Returns the tensors of a list in the header. Throws Error naming the file and the list if a tensor lies outside
-  /// the data.
+  /// Returns the tensors that a list in the header describes. Throws Error, which names the file and the list, if a
+  /// tensor is outside the data.
   std::vector<StoredTensor> tensors(const char* list) const;
-  /// Returns the bytes of a header entry that holds offset and size. Throws as tensors() does.
+  /// Returns the bytes whose offset and size a header entry contains. Throws as tensors() does.
   std::string_view bytes(const char* entry) const;
-  /// Returns the policy. Throws Error naming the entry of the observation schema that differs from the current schema.
+  /// Returns the policy. Throws Error if its observation schema differs from the current schema; the message names the
+  /// first different entry.
   StoredPolicy policy() const;
 
   std::string path;
@@ -38,12 +39,12 @@ struct CheckpointFile {
   std::string_view data;
 };
 
-/// Builder of a checkpoint. Each part's data are appended to `data`, and the header records where the part begins.
+/// Builder of a checkpoint. Each add function appends to `data` and stores offset and size in the header.
 struct CheckpointWriter {
   nlohmann::ordered_json header;
   std::string data;
 
-  /// Adds configuration, schema, rig and counters of a policy, without its weights.
+  /// Adds configuration, observation schema, cameras and counters of a policy to the header.
   void add_policy(const PolicyFacts& policy);
   void add_weights(const StoredPolicy& policy);
   void add_tensors(const char* list, const std::vector<StoredTensor>& tensors);
@@ -52,7 +53,7 @@ struct CheckpointWriter {
   std::string finish();
 };
 
-/// Calls read() and returns its result. Throws Error naming the file if read() throws a JSON exception.
+/// Calls read() and returns its result. Converts a JSON exception of read() to an Error that names the file.
 template <typename Read>
 auto read_header(const std::string& path, const Read& read) {
   try {

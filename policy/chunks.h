@@ -1,6 +1,6 @@
 // Splits a batch into chunks that pass through the network one after the other. All chunks of a batch have the same
-// size. On a device only few different sizes occur. Libraries therefore build what they need for a size (cuDNN's plans,
-// CUDA graphs) once, although the number of active agents varies.
+// size. On a device, sizes are rounded so that only few different sizes occur, although the number of active agents
+// varies. So plans of cuDNN and CUDA graphs, which depend on the size, are rarely rebuilt.
 #pragma once
 
 #include <algorithm>
@@ -9,11 +9,11 @@
 
 namespace pictura {
 
-/// Granularity of chunk sizes on a device: a size is a multiple of this number, or the maximum size.
+/// Chunk sizes on a device are multiples of this number, or the maximum size.
 constexpr int64_t kChunkGranule = 256;
 
-/// Sizes of the chunks of a batch: equal parts of at most `max_size` rows. With `are_full` every chunk has `max_size`
-/// rows, so that arithmetic that depends on the chunk size does not depend on the batch size.
+/// Sizes of the chunks of a batch: equal parts of at most `max_size` rows. With `are_full`, every chunk has `max_size`
+/// rows; results that depend on the chunk size then do not depend on the batch size.
 struct ChunkSizes {
   int64_t max_size = 1;
   bool are_full = false;
@@ -28,14 +28,14 @@ inline int64_t chunk_size(int64_t count, const ChunkSizes& sizes, bool on_device
   return std::min(max_size, (equal + granule - 1) / granule * granule);
 }
 
-/// Consecutive rows of a batch from row `begin` on. Of `rows`, i64 [chunk size], only the first `count` entries belong
-/// to the chunk. The other entries are padding: they repeat the batch's first row, and their results must be discarded.
+/// Elements [begin, begin + count) of a batch. `rows` are their row numbers, i64 [chunk size], followed by padding.
+/// Padding repeats the batch's first element; its results must be discarded.
 struct Chunk {
   at::Tensor rows;
   int64_t begin = 0, count = 0;
 
   int64_t size() const { return rows.size(0); }
-  /// Returns the chunk's elements of an array of the batch, padded with zeros.
+  /// Returns the chunk's elements of an array over the batch, padded with zeros.
   at::Tensor take(const at::Tensor& of_batch) const {
     return at::constant_pad_nd(of_batch.narrow(0, begin, count), {0, size() - count});
   }

@@ -6,7 +6,7 @@ namespace pictura {
 
 namespace {
 
-// Returns each slot's element of an array over worlds: [slots].
+// Returns, for each slot, the element of an array [worlds] for the slot's world.
 template <typename T>
 at::Tensor values_of_slots(const SimulatorArrays& input, Span<const T> of_worlds) {
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());

@@ -13,8 +13,8 @@ namespace pictura {
 
 namespace {
 
-// Returns the policy for images of another size: patches and line floor grow with the images, and the first convolution
-// is spread.
+// Returns the policy for larger images: patches and line floor become larger by the same factor, and the first
+// convolution is spread.
 StoredPolicy resized_policy(const StoredPolicy& policy, ImageSize size) {
   const Config& config = policy.config;
   if (!config.reads_images()) fail_usage("{}: size: its policy reads no images", policy.path);
@@ -33,7 +33,7 @@ StoredPolicy resized_policy(const StoredPolicy& policy, ImageSize size) {
   }
   StoredPolicy result = policy;
   result.config.policy.patch_px *= factor;
-  // The product is rounded to the value that a person would write: .35 times 3 is 1.05, not 1.0499999999999998.
+  // The product is rounded, so that 0.35 times 3 is 1.05 and not 1.0499999999999998.
   result.config.render.line_floor_px = std::round(1e6 * factor * config.render.line_floor_px) / 1e6;
   if (result.config.policy.patch_px > kMaxPatch_px || result.config.render.line_floor_px > kMaxLineFloor_px) {
     fail_usage("{}: size: expected patches of at most {} px and lines of at most {} px, got {} and {} for {}x{}",

@@ -1,4 +1,4 @@
-// Exports weights for releases and other tools: a policy as safetensors. Has no torch headers.
+// Exports a policy as a safetensors file, for releases and other tools. Includes no torch headers.
 #pragma once
 
 #include <cstdint>
@@ -9,15 +9,15 @@
 
 namespace pictura {
 
-/// Type to which the weights of a file are rounded.
+/// Type of the weights in a file.
 enum class WeightType {
   f32,   // unchanged
-  bf16,  // half the file size, with relative steps of 2^-8
+  bf16,  // rounded to 8 significant bits, which halves the file size
 };
 
 struct ExportedPolicy {
   int64_t parameters = 0, file_bytes = 0;
-  int64_t updates = 0, agent_steps = 0;  // updates and agent-steps of the run
+  int64_t updates = 0, agent_steps = 0;  // counters of the training run
   std::string policy_hash;               // hash of the weights in the file
 };
 
@@ -25,14 +25,14 @@ struct ExportedPolicy {
 struct ExportOptions {
   WeightType weights = WeightType::bf16;
   std::string commit;             // commit of the program, for the metadata
-  bool average = false;           // export the weight average, which a checkpoint may hold
-  std::optional<ImageSize> size;  // image size: a whole multiple k of the policy's width and height
+  bool average = false;           // export the average of weights, which some checkpoints contain
+  std::optional<ImageSize> size;  // larger image size: k times the policy's width and height, with an integer k
 };
 
-/// Writes the policy of a checkpoint, or of safetensors, to `out`, as write_policy() does. With options.size, patches
-/// and line floor become k times as large, and the first convolution is spread over the larger patches
-/// (policy/patch_spread.h). Throws Error naming the file that cannot be read or written, or that holds no average.
-/// Throws UsageError naming `size` if the policy cannot have that size.
+/// Reads a policy from a checkpoint or a safetensors file and writes it to `out` as write_policy() does. With
+/// options.size, patches and the minimum width of drawn lines become k times as large, and the first convolution is
+/// spread over the larger patches (policy/patch_spread.h). Throws Error, which names the file, if a file cannot be read
+/// or written, or contains no average. Throws UsageError, which names `size`, if the policy cannot have that size.
 ExportedPolicy export_policy(const std::string& policy_path, const std::string& out, const ExportOptions& options);
 
 }  // namespace pictura

@@ -8,8 +8,8 @@ namespace {
 
 constexpr int kChannelMultiple = 8;
 
-// Places of outputs' inputs in an array: each output reads `run` numbers in each of `kernel` rows, which are row_step
-// apart.
+// Positions of the outputs' inputs (windows) in an array. A window has `kernel` rows of `run` consecutive numbers; its
+// rows are row_step numbers apart.
 struct Windows {
   const int64_t* begins;  // first element of each window's first row
   int64_t count, kernel, run, row_step;
@@ -130,7 +130,8 @@ PICTURA_INLINE void image_gradients_of(const Windows& windows, int64_t window, i
 template <int kFloats>
 PICTURA_INLINE void all_image_gradients(const Windows& windows, int64_t outputs, const float* grad, const float* weight,
                                         float* padded_grad) {
-  // The number of windows at a time does not depend on the vector width, so that sums have one order.
+  // The number of windows per call does not depend on the vector width, so that the order of sums does not depend on it
+  // either.
   constexpr int kWindows = 4;
   int64_t window = 0;
   for (; window + kWindows <= windows.count; window += kWindows) {
@@ -143,8 +144,8 @@ PICTURA_INLINE void all_image_gradients(const Windows& windows, int64_t outputs,
 
 enum class Pass { outputs, weight_gradient, image_gradient };
 
-// Runs one of the three passes on two arrays: windows and weight, windows and gradient, or gradient and weight. Uses
-// vectors of sixteen floats, or of eight floats with half as many values in registers.
+// Runs one of the three passes. a and b are its inputs: padded images and weight, padded images and gradient, or
+// gradient and weight. Uses vectors of 16 floats, or vectors of 8 floats with half as many values in registers.
 template <bool kIsWide>
 PICTURA_INLINE void run(Pass pass, const Windows& windows, int64_t outputs, const float* a, const float* b,
                         float* out) {

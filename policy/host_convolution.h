@@ -1,6 +1,6 @@
-// Convolutions with few output channels on the host. Convolution by matrix products needs a matrix of each output's
-// inputs (taps). Here registers hold the sums of several outputs instead, while taps are read in place.
-// Single-threaded, on contiguous fp32 arrays.
+// Convolutions with few output channels on the host. A convolution by matrix products would first copy the inputs of
+// each output (its taps) into a matrix. This convolution reads taps in place and keeps the sums of several outputs in
+// registers. Single-threaded, on contiguous fp32 arrays.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +26,8 @@ struct ConvolutionSize {
 /// Convolution of blocks of images. The bits of its results do not depend on the vector width.
 class DirectConvolution {
  public:
-  /// Whether the convolution supports this number of outputs, and the image gradient this number of channels.
+  /// Whether compute() supports this number of output channels, and compute_image_gradient() this number of input
+  /// channels.
   static bool supports(int64_t outputs) { return outputs == 8 || outputs == 16 || outputs == 32; }
   static bool supports_gradient(int64_t channels) { return channels % 8 == 0; }
 
@@ -34,19 +35,19 @@ class DirectConvolution {
   DirectConvolution(const ConvolutionSize& size, int64_t outputs, int64_t max_images,
                     bool is_wide = has_wide_vectors());
 
-  /// Copies images [n, height, width, channels] for the functions below.
+  /// Copies images [n, height, width, channels], which the functions below use.
   void read(const float* images, int64_t n);
-  /// Computes the outputs. weight: [taps, outputs]; out: [n, rows, columns, outputs].
+  /// Computes the outputs of the images. weight: [taps, outputs]; out: [n, rows, columns, outputs].
   void compute(const float* weight, float* out) const;
-  /// Adds to the weight gradient, [taps, outputs]. grad_out: gradient of `out`.
+  /// Adds to the gradient of the weight, [taps, outputs]. grad_out: gradient of `out`.
   void add_weight_gradient(const float* grad_out, float* weight_grad_inout) const;
 
-  /// Sets the gradient of the images. weight: [outputs, taps].
+  /// Computes the gradient of the images. weight: [outputs, taps].
   void compute_image_gradient(const float* grad_out, const float* weight, float* images_grad_out);
 
  private:
-  /// Calls f(offset of the row in padded_, offset of the row in images, number of values in the row) for each row of
-  /// the images.
+  /// For each row of the images, calls f(offset of the row in padded_, offset in the images, number of values in the
+  /// row).
   template <typename F>
   void for_each_row(const F& f) const;
 
@@ -54,7 +55,7 @@ class DirectConvolution {
   int64_t outputs_, n_ = 0;
   bool is_wide_;
   std::vector<float> padded_, padded_grad_;  // [max_images, height, width, channels] with padding
-  std::vector<int64_t> windows_;             // offsets in padded_ at which each output's inputs begin
+  std::vector<int64_t> windows_;             // for each output, the offset of its first tap in padded_
 };
 
 }  // namespace pictura::host

@@ -1,4 +1,4 @@
-// Devices in builds without torch, which compute policies on the host.
+// Implementation of learning_device.h for builds without torch, which compute policies on the host.
 #include <cstring>
 
 #include "pictura/common/error.h"

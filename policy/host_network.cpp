@@ -25,7 +25,7 @@ namespace {
 
 using Numbers = std::vector<float>;
 
-// Returns memory for at least `numbers` floats, which is reused by later calls.
+// Returns memory for at least `numbers` floats. Later calls return the same memory if it is large enough.
 float* room(Numbers* memory, int64_t numbers) {
   if (memory->size() < static_cast<size_t>(numbers)) memory->resize(static_cast<size_t>(numbers));
   return memory->data();
@@ -55,7 +55,7 @@ struct Dense {
   }
 };
 
-/// The paper's encoder of a group: two linear layers.
+/// The paper's encoder of a group of features: two linear layers.
 struct Group {
   Dense hidden, out;
   bool layer_norm = false;
@@ -129,7 +129,7 @@ class ParameterReader {
   size_t taken_ = 0;
 };
 
-/// Encoder of entity sets: see VectorEncoder.
+/// Encoder of entity sets, see VectorEncoder in policy.cpp.
 class SetEncoder {
  public:
   SetEncoder(const Config& config, ParameterReader* read) : width_(config.policy.embedding_width) {
@@ -169,7 +169,7 @@ class SetEncoder {
       host::largest_members(its_embeddings, counts.data(), count, width_, largest.data(), which.data());
       for (int64_t i = 0; i < count; ++i) {
         for (int64_t c = 0; c < width_; ++c) {
-          // The bias is added after the maximum, since it does not change which member is the largest.
+          // The bias is added after the maximum, because it does not change which member is the largest.
           to[i * width() + static_cast<int64_t>(g) * width_ + c] =
               largest[i * width_ + c] + (counts[i] > 0 ? group.encoder.out.bias[c] : 0);
         }
@@ -197,7 +197,8 @@ class SetEncoder {
   std::vector<SetGroup> groups_;
 };
 
-/// Encoder of images: convolutions, and attention of learned queries over their output. See PerspectiveEncoder.
+/// Encoder of images: convolutions, and attention of learned queries over their output. See PerspectiveEncoder in
+/// policy.cpp.
 class ImageEncoder {
  public:
   ImageEncoder(const PolicySection& config, int num_cameras, ParameterReader* read)
@@ -445,7 +446,8 @@ struct HostNetwork::Parts {
     read.finish();
   }
 
-  // Encodes ego, and conditioning with waypoints, of agents [begin, begin + count) to columns [at, in_width) of `to`.
+  // Encodes the ego features, and conditioning with waypoints, of agents [begin, begin + count). Writes to columns [at,
+  // in_width) of `to`.
   void encode_own(const ObservationView& arrays, int64_t begin, int64_t count, int64_t at, float* to) const {
     const int64_t ego_width = ego.hidden.in;
     Numbers egos, own;
@@ -485,7 +487,8 @@ struct HostNetwork::Parts {
     return x;
   }
 
-  // Computes the outputs of agents [begin, begin + count). pooled: result of ImageEncoder::pool() for all agents.
+  // Computes the outputs of agents [begin, begin + count). `pooled` is the result of ImageEncoder::pool() for all
+  // agents.
   void forward(const ObservationView& arrays, const Numbers& pooled, int64_t begin, int64_t count, float* logits_out,
                float* values_out) const {
     const int64_t scene_width = images ? images->width() : sets->width();
@@ -520,7 +523,7 @@ HostNetwork::~HostNetwork() = default;
 
 void HostNetwork::forward(const HostObservation& observation, int num_threads, float* logits_out,
                           float* values_out) const {
-  constexpr int64_t kAgentsAtOnce = 16;  // the activations of this number of agents fit a core's cache
+  constexpr int64_t kAgentsAtOnce = 16;  // activations of this number of agents fit a core's cache
   const Numbers pooled = parts_->images ? parts_->images->pool(observation, num_threads) : Numbers();
   parallel_for(num_threads, (observation.agents + kAgentsAtOnce - 1) / kAgentsAtOnce, [&](int64_t block) {
     const int64_t begin = block * kAgentsAtOnce, count = std::min(kAgentsAtOnce, observation.agents - begin);

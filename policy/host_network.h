@@ -28,15 +28,16 @@ struct HostObservation {
 
 class HostNetwork {
  public:
-  /// Reads the parameters of a policy with `num_cameras` cameras. Throws Error naming the file and the first parameter
-  /// that is missing, of another shape or not finite. Throws Error naming the program if one replaces the convolutions.
+  /// Reads the parameters of a policy with `num_cameras` cameras. Throws Error, which names the file and the parameter,
+  /// if a parameter is missing, has another shape or is not finite. Throws Error, which names the program, if a
+  /// pretrained program replaces the policy's convolutions (policy.backbone).
   HostNetwork(const StoredPolicy& saved, int num_cameras);
   ~HostNetwork();
   HostNetwork(const HostNetwork&) = delete;
   HostNetwork& operator=(const HostNetwork&) = delete;
 
   /// Writes logits [agents, kNumActions] and values [agents], on at most num_threads threads (0: all). The result of an
-  /// agent does not depend on the other agents. Serves one thread at a time.
+  /// agent does not depend on the other agents. Only one thread may call this at a time.
   void forward(const HostObservation& observation, int num_threads, float* logits_out, float* values_out) const;
 
  private:

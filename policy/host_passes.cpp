@@ -13,11 +13,12 @@ namespace pictura::host {
 
 namespace {
 
-// Computes exp(x) for x <= 0, within 2e-7. The function in common/math.h, whose bits are equal on all devices,
-// multiplies by 2^n in a loop. Here 2^n is written as a float's exponent bits, which compilers vectorise.
+// Computes exp(x) for x <= 0 with an error of at most 2e-7. exp_of() in common/math.h has equal bits on all devices,
+// but multiplies by 2^n in a loop. This function writes 2^n as the exponent bits of a float, which compilers can
+// vectorise.
 PICTURA_INLINE float exp_of_negative(float x) {
   x = x < -87.0f ? -87.0f : x;  // NaN remains NaN
-  // The last bits of the sum are n as a whole number; subtracting kRounder again gives n as a float.
+  // The last bits of the sum are n as an integer; subtracting kRounder again gives n as a float.
   constexpr float kRounder = 12582912.0f;  // 1.5 * 2^23
   const float shifted = x * 1.44269504f + kRounder, n = shifted - kRounder;
   const float r = (x - n * 0.693359375f) + n * 2.12194440e-4f;
@@ -33,8 +34,8 @@ struct Normal {
   float cumulative, density;  // density: without its factor 1 / sqrt(2 pi)
 };
 
-// Returns the standard normal distribution at x, by approximation 7.1.26 of the error function in Abramowitz and
-// Stegun. Its error is below 1.5e-7, and it contains the exponential that the density needs.
+// Returns the standard normal distribution at x. It uses approximation 7.1.26 of the error function in Abramowitz and
+// Stegun, because its error is below 1.5e-7 and it computes the exponential that the density also needs.
 PICTURA_INLINE Normal normal_at(float x) {
   const float size = x < 0 ? -x : x;
   const float t = 1.0f / (1.0f + 0.3275911f * 0.70710678f * size);
@@ -46,8 +47,8 @@ PICTURA_INLINE Normal normal_at(float x) {
 
 constexpr float kDensityFactor = 0.39894228f;
 
-// Several rows of few channels are processed as one longer row of kRowNumbers, since the overhead of loops over short
-// rows exceeds their work. The last of the longer rows may be shorter.
+// Several rows with few channels are processed as one row of kRowNumbers numbers, because loops over short rows have a
+// large overhead. The last such row may be shorter.
 constexpr int64_t kRowNumbers = 64;
 
 int64_t channels_at_once(int64_t channels) {
@@ -175,8 +176,9 @@ void bias_norm_backward(const float* normalized, const float* inverse_deviations
 
 namespace {
 
-// Calls f(taps, pixels, count) for each run of numbers that an output's taps share with a row of an image. `taps` is
-// the run's offset in the taps of all images, `pixels` its offset in the images, or -1 for a run of padding.
+// Calls f(taps, pixels, count) for each run of `count` consecutive numbers that an output reads from a row of an image.
+// `taps` is the run's offset in the taps of all images; `pixels` is its offset in the images, or -1 if the run is
+// padding.
 template <typename F>
 void for_each_run(const ConvolutionSize& size, int64_t n, const F& f) {
   const int64_t channels = size.channels, of_image = size.height * size.width * channels,
@@ -226,8 +228,8 @@ namespace {
 
 constexpr int64_t kColors = 3;
 
-// Writes the patches of an image. `planes`: the image's three colors. With kPatch > 0 the compiler knows the loop
-// bounds of patches that lie wholly in the image; 0: patches of any size.
+// Writes the patches of an image. `planes` are the image's three colors. If kPatch > 0, it is the size of patches, so
+// that the compiler knows the loop bounds of whole patches; 0: any size.
 template <int64_t kPatch>
 void patches_of_image(const uint8_t* planes, int64_t height, int64_t width, [[maybe_unused]] int64_t patch_px,
                       float* out) {
@@ -289,7 +291,7 @@ void largest_members(const float* members, const int32_t* counts, int64_t sets, 
     for (int32_t member = 0; member < count; ++member, members += channels) {
 #pragma omp simd
       for (int64_t c = 0; c < channels; ++c) {
-        // A NaN is selected and kept as the largest value, so that a failing network is noticed.
+        // A NaN counts as the largest value, so that it propagates to the output and is noticed.
         const bool is_larger = (members[c] > largest_out[c]) | (members[c] != members[c]);
         largest_out[c] = is_larger ? members[c] : largest_out[c];
         which_out[c] = is_larger ? member : which_out[c];
@@ -301,7 +303,7 @@ void largest_members(const float* members, const int32_t* counts, int64_t sets, 
 void largest_members_backward(const float* grad, const int32_t* which, int64_t sets, int64_t channels, int64_t hidden,
                               const float* weight, const float* activations, float* activations_grad_inout,
                               float* weight_grad_inout) {
-  // The two matrices are updated one after the other, so that the matrix in use stays in the first-level cache.
+  // The two gradients are updated one after the other, so that the one in use stays in the first-level cache.
   const auto add_all = [&](const auto& add) {
     for (int64_t i = 0; i < sets * channels; ++i) {
       if (which[i] >= 0) add(grad[i], i % channels, int64_t{which[i]});

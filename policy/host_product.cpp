@@ -1,4 +1,4 @@
-// Matrix products in which registers hold the sums of a few rows and columns, and both matrices are read in place.
+// Matrix products. They read both matrices in place and keep the sums of a few rows and columns in registers.
 #include "pictura/policy/host_product.h"
 
 namespace pictura::host {

@@ -13,7 +13,7 @@ struct ReadMatrix {
   int64_t row_stride, column_stride = 1;
 };
 
-/// Sets out = a b. a: [rows, inner]; b: [inner, columns] without gaps; out: [rows, columns] without gaps, must not
+/// Computes out = a b. a: [rows, inner]; b: [inner, columns] and out: [rows, columns], both contiguous. `out` must not
 /// overlap a or b. Products are summed in a fixed order, so the bits of a row do not depend on other rows or on the
 /// width of vectors.
 void multiply(const ReadMatrix& a, const float* b, int64_t rows, int64_t inner, int64_t columns, float* out,

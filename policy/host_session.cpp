@@ -21,7 +21,7 @@ namespace {
 // Observation arrays of selected agents.
 class GatheredRows {
  public:
-  /// Throws Error naming an array that the policy reads and whose size is not that of `batch` agents.
+  /// Throws Error, which names the array, if the size of an array that the policy reads is not that of `batch` agents.
   GatheredRows(const Config& config, const ObservationView& all, int64_t batch, Span<const int64_t> indices) {
 #define X(name, type, rows, features, part, comment)                                                           \
   if (config.reads(part)) {                                                                                    \
@@ -38,7 +38,7 @@ class GatheredRows {
 #undef X
   }
 
-  /// Writes zeros to the auxiliary slots of vectors (see simulator/observation.h), as in a world without them.
+  /// Sets all auxiliary features to zero (see simulator/observation.h), as if the simulator did not observe them.
   void hide_auxiliary() {
     constexpr size_t kOfEgo = kEgoFeatures - 2, kOfPartner = kPartnerFeatures - 1;
     for (size_t i = 0; i < ego_.size(); ++i) ego_[i] = i % kEgoFeatures < kOfEgo ? ego_[i] : 0;
@@ -81,7 +81,7 @@ struct HostSession final : SessionParts {
   void decide(const PolicyInput& input, int64_t batch, Span<const int64_t> indices, Renderer* renderer,
               float* logits_out, float* values_out) const {
     if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
-    constexpr int64_t kMostAtOnce = 512;  // agents; at the paper's size, the images of each take 62 KB
+    constexpr int64_t kMostAtOnce = 512;  // agents; at the paper's image size, the images of an agent take 62 KB
     const auto total = static_cast<int64_t>(indices.size());
     const int64_t max_members = std::min<int64_t>(config.train.forward_chunk, kMostAtOnce);
     for (int64_t begin = 0; begin < total; begin += max_members) {
@@ -103,7 +103,8 @@ struct HostSession final : SessionParts {
   const std::unique_ptr<PolicyExecutor> executor;
 
  private:
-  // Returns the pixels of the agents' images, to which the blocks point. Images of agents that are not drawn are black.
+  // Returns the pixels of the agents' images. *blocks_out gets pointers to them. Images of agents that are not drawn
+  // are black.
   std::vector<uint8_t> draw(const PolicyInput& input, Span<const int64_t> indices, Renderer* renderer,
                             std::vector<HostImageBlock>* blocks_out) const {
     const auto num_views = static_cast<int64_t>(indices.size());
@@ -120,14 +121,15 @@ struct HostSession final : SessionParts {
       next += num_views * cameras * 3 * block.size.pixels();
     }
     std::vector<View> views;
-    std::vector<int64_t> places;  // indices of the views among the agents
+    std::vector<int64_t> places;  // index of the agent of each view
     for (int64_t i = 0; i < num_views; ++i) {
       if (!input.is_drawn.empty() && !input.is_drawn[indices[i]]) continue;
       views.push_back(input.views[indices[i]]);
       places.push_back(i);
     }
     if (views.empty()) return pixels;
-    // Images are drawn without gaps, then moved to the places of their agents, the last image first.
+    // The renderer draws the images contiguously. Then they are moved to the positions of their agents, the last image
+    // first.
     std::vector<CameraImages> cameras;
     std::vector<int64_t> num_placed(layout.blocks.size());
     for (const CameraLayout& camera : layout.cameras) {
@@ -202,9 +204,9 @@ class HostController final : public PolicyController {
   Renderer* renderer_;
   ActionChoice choice_;
   bool hides_auxiliary_;
-  int64_t step_ = 0;              // calls of act()
-  std::vector<int32_t> actions_;  // [slots], held until the next decision
-  std::vector<uint8_t> acted_;    // [slots] at the previous step
+  int64_t step_ = 0;              // number of calls of act()
+  std::vector<int32_t> actions_;  // [slots] actions that agents hold until their next decision
+  std::vector<uint8_t> acted_;    // [slots] whether the agent was active at the previous step
   int64_t num_driven_ = 0;
 };
 

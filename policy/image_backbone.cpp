@@ -16,13 +16,13 @@ namespace pictura {
 
 namespace {
 
-constexpr const char* kDescription = "pictura_backbone.json";  // entry in the program's file
+constexpr const char* kDescription = "pictura_backbone.json";  // name of the description in the program's file
 constexpr const char* kBackboneFormat = "pictura backbone 1";
 
-// Returns the first line of an error of torch; a stack trace follows it.
+// Returns the first line of a torch error, which a stack trace follows.
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-// Returns the last line of a program's error; a stack trace precedes it.
+// Returns the last line of a program's error, which follows a stack trace.
 std::string last_line(std::string text) {
   text.erase(text.find_last_not_of(" \n") + 1);
   return text.substr(text.rfind('\n') + 1);
@@ -115,8 +115,8 @@ at::Tensor ImageBackbone::forward(const at::Tensor& images) const {
   const int64_t height = pixels.size(2), width = pixels.size(3), patch = parts_->patch_px;
   const at::Tensor whole =
       at::constant_pad_nd(pixels, {0, parts_->filled_up(width) - width, 0, parts_->filled_up(height) - height});
-  // Torch's optimizer of programs specialises a program for the inputs of earlier calls, so that equal calls would give
-  // different bits.
+  // Torch's optimizer of programs would specialise the program for the inputs of earlier calls, so that equal calls
+  // could give different bits.
   const torch::jit::GraphOptimizerEnabledGuard no_optimizer(false);
   const bool needs_grad = at::GradMode::is_enabled() && !parts_->frozen;
   const at::AutoGradMode grad(needs_grad);

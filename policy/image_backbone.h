@@ -1,5 +1,5 @@
-// Pretrained image network that replaces the convolutions: a TorchScript program with its description, written by
-// scripts/export_backbone.
+// Pretrained image network that replaces a policy's convolutions: a file of scripts/export_backbone, which contains a
+// TorchScript program and its description.
 #pragma once
 
 #include <memory>
@@ -16,24 +16,24 @@ struct NamedTensor;
 
 class ImageBackbone {
  public:
-  /// Reads a program, with its weights in the type and on the device of `options`. Frozen weights get no gradients.
-  /// Throws Error naming the file if it does not exist or is not a program of scripts/export_backbone.
+  /// Reads a program. `options` are the type and device of its weights. If `frozen`, the weights get no gradients.
+  /// Throws Error, which names the file, if it does not exist or is not a file of scripts/export_backbone.
   ImageBackbone(const std::string& path, const at::TensorOptions& options, bool frozen);
   ~ImageBackbone();
 
-  /// Channels of a feature map.
+  /// Number of channels of a feature map.
   int64_t channels() const;
   /// Hash of the file's bytes: 16 hexadecimal digits.
   const std::string& hash() const;
   /// Trained weights; their names are "image_backbone." followed by the name in the program. Empty if frozen.
   const std::vector<NamedTensor>& parameters() const;
-  /// Throws Error naming file and camera if the program supports only one image size and a camera of the rig has
+  /// Throws Error, which names file and camera, if the program supports only one image size and a camera of the rig has
   /// another size.
   void check_images(const Rig& rig) const;
 
-  /// Computes feature maps, [cameras * views, channels, rows, columns] with channels last in memory, of images, u8
-  /// [views, cameras, 3, height, width]. Each position of the map belongs to one patch of the image. Images whose size
-  /// is no multiple of the patch size are padded with black at the right and the bottom.
+  /// Computes the feature maps of images. images: u8 [views, cameras, 3, height, width]; result: [cameras * views,
+  /// channels, rows, columns], with channels last in memory. Each position of a map corresponds to one patch of the
+  /// image. Images whose size is not a multiple of the patch size are padded with black at the right and the bottom.
   at::Tensor forward(const at::Tensor& images) const;
 
  private:

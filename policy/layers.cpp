@@ -31,13 +31,13 @@ ActivationType activation_type_of(at::ScalarType type) {
   return type == at::kBFloat16 ? ActivationType::bf16 : ActivationType::f32;
 }
 
-// Size of a tensor whose last dimension is the channels.
+// Returns the size of a tensor whose last dimension is the channels.
 ActivationSize size_of(const at::Tensor& x) {
   return {activation_type_of(x.scalar_type()), x.numel() / x.size(-1), x.size(-1)};
 }
 
-/// Creates the passes of a device. Passes hold no state; each call creates its own, so that autograd's threads share no
-/// object.
+/// Creates the NetworkPasses of a device. They have no state. Each call creates its own object, so that threads of
+/// autograd share none.
 std::unique_ptr<NetworkPasses> passes_on(at::Device device) {
   return make_network_passes({MemorySpace::cuda, device.index()});
 }
@@ -75,7 +75,8 @@ struct BiasGelu : Function<BiasGelu<kHasNorm>> {
   }
 };
 
-// Layer norm on a device. x: [..., channels], contiguous; position: [period, channels] of x's type, or undefined.
+// Layer norm on a device. x: [..., channels], contiguous; position: [period, channels] with the type of x, or
+// undefined.
 struct Norm : Function<Norm> {
   static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const std::optional<at::Tensor>& added,
                             const at::Tensor& weight, const at::Tensor& bias) {
@@ -152,8 +153,8 @@ bool keeps_gradients(std::initializer_list<at::Tensor> inputs) {
          std::any_of(inputs.begin(), inputs.end(), [](const at::Tensor& t) { return t.requires_grad(); });
 }
 
-// Divides [0, count) into one part per thread of torch, and each part into blocks of at most `block`. Sums of parts are
-// added in the order of parts, so results depend only on the number of threads, not on timing.
+// Divides [0, count) into one part per thread of torch, and each part into blocks of at most `block` elements. Callers
+// add the sums of parts in the order of parts, so results depend on the number of threads, but not on timing.
 class Blocks {
  public:
   Blocks(int64_t count, int64_t block)
@@ -166,7 +167,8 @@ class Blocks {
   /// Size of the largest block.
   int64_t max_size() const { return std::min(block_, count_); }
 
-  /// Calls make(part) once per part. It returns a function that is called with (begin, end) of each block of the part.
+  /// Calls make(part) once per part. The function that make() returns is then called with (begin, end) of each block of
+  /// the part.
   template <typename Make>
   void run(const Make& make) const {
     at::parallel_for(0, parts_, 1, [&](int64_t first, int64_t last) {
@@ -187,7 +189,7 @@ class Blocks {
 const float* read(const at::Tensor& t, int64_t row = 0) { return t.const_data_ptr<float>() + row * t.stride(0); }
 float* write(const at::Tensor& t, int64_t row = 0) { return t.mutable_data_ptr<float>() + row * t.stride(0); }
 
-// Sets `out`, and `slope` if it is defined, by host::bias_gelu(). All tensors are [..., channels] and contiguous.
+// Computes `out`, and `slope` if it is defined, with host::bias_gelu(). All tensors are [..., channels] and contiguous.
 void add_bias_gelu(const at::Tensor& x, const at::Tensor& bias, const at::Tensor& out, const at::Tensor& slope) {
   const int64_t channels = bias.size(0), rows = x.numel() / channels;
   const float* const from = read(x);
@@ -201,7 +203,8 @@ void add_bias_gelu(const at::Tensor& x, const at::Tensor& bias, const at::Tensor
   });
 }
 
-// GELU of x + bias, [..., channels], contiguous. Nothing else may read x, whose memory stores the derivative.
+// GELU of x + bias. x: [..., channels], contiguous. The memory of x is overwritten with the derivative, so no other
+// code may read x.
 struct HostBiasGelu : Function<HostBiasGelu> {
   static at::Tensor forward(AutogradContext* context, const at::Tensor& x, const at::Tensor& bias) {
     at::Tensor out = at::empty_like(x), slope = x.detach();
@@ -237,8 +240,8 @@ host::ConvolutionSize convolution_size(const at::Tensor& x, const at::Tensor& we
   return {x.size(1), x.size(2), x.size(3), weight.size(2), stride};
 }
 
-// Computes a convolution with its GELU by Pass::compute(), and saves what the backward pass needs: images, weight, and
-// the slopes of the GELUs.
+// Computes a convolution with GELU by Pass::compute(), and saves the tensors that the backward pass needs: images,
+// weight, and the derivatives of the GELUs.
 template <typename Pass>
 at::Tensor forward_with_slopes(AutogradContext* context, const at::Tensor& x, const at::Tensor& weight,
                                const at::Tensor& bias, int64_t stride) {
@@ -249,7 +252,8 @@ at::Tensor forward_with_slopes(AutogradContext* context, const at::Tensor& x, co
   return out;
 }
 
-// Convolution of few outputs by host::DirectConvolution, one block of images at a time. Shapes as in HostConvolution.
+// Convolution with few output channels by host::DirectConvolution, one block of images at a time. Shapes as in
+// HostConvolution.
 struct HostDirectConvolution : Function<HostDirectConvolution> {
   static bool supports(const at::Tensor& x, const at::Tensor& weight) {
     return host::DirectConvolution::supports(weight.size(0)) &&
@@ -315,10 +319,10 @@ struct HostDirectConvolution : Function<HostDirectConvolution> {
   }
 };
 
-// Convolution as matrix products of the outputs' taps with the weights, one block of images at a time. For few channels
-// its backward pass is two to four times as fast as oneDNN's.
+// Convolution as matrix products of taps (the inputs of each output) and weights, one block of images at a time. For
+// few channels, its backward pass is two to four times as fast as that of oneDNN.
 struct HostConvolution : Function<HostConvolution> {
-  /// With fewer outputs than this, products leave most of a vector unit idle.
+  /// Minimum number of output channels; with fewer, matrix products do not fill a vector unit.
   static constexpr int64_t kMinOutputs = 16;
 
   HostConvolution(const at::Tensor& x, const at::Tensor& w, int64_t stride)
@@ -339,15 +343,16 @@ struct HostConvolution : Function<HostConvolution> {
   at::Tensor of_images(const at::Tensor& rows, int64_t begin, int64_t end) const {
     return rows.narrow(0, begin * size.pixels(), (end - begin) * size.pixels());
   }
-  /// Returns the taps of the outputs of images [begin, end), in `memory` unless they are the images themselves.
+  /// Returns the taps of the outputs of images [begin, end). If the taps are the pixels themselves, these are returned,
+  /// else `memory` is filled.
   at::Tensor taps(const at::Tensor& x, const at::Tensor& memory, int64_t begin, int64_t end) const {
     if (reads_pixels()) return of_images(x.view({-1, size.channels}), begin, end);
     host::unfold(size, read(x, begin), end - begin, write(memory));
     return memory.narrow(0, 0, (end - begin) * size.pixels());
   }
 
-  /// Computes the outputs, [n, rows, columns, outputs], of x: [n, height, width, channels]. Sets the derivatives of the
-  /// GELUs, of the same shape, if `slope_out` is not null.
+  /// Returns the outputs, [n, rows, columns, outputs]. x: [n, height, width, channels]. If `slope_out` is not null, it
+  /// gets the derivatives of the GELUs, with the shape of the outputs.
   static at::Tensor compute(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride,
                             at::Tensor* slope_out) {
     const HostConvolution c(x, weight, stride);
@@ -402,12 +407,11 @@ struct HostConvolution : Function<HostConvolution> {
   }
 };
 
-// Largest embeddings of sets, computed in blocks of sets. Each member passes through a layer with GELU, with or without
-// a norm before it, and a layer without GELU. Each channel's gradient goes only to its largest member, so the backward
-// pass reads only a few members per set.
+// Implementation of largest_embedding() on the host, in blocks of sets. The gradient of a channel goes only to the
+// member with the largest value, so the backward pass reads only a few members per set.
 struct HostSets : Function<HostSets> {
-  /// Returns three tensors: largest embeddings, [sets, channels]; present members with their features, [all, width];
-  /// indices of the largest members in their sets, i32 [sets, channels].
+  /// Returns three tensors: the largest embeddings, [sets, channels]; the members of all sets with their features,
+  /// [all, width]; the index of the largest member in its set, i32 [sets, channels].
   static variable_list compute(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
                                bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
                                const at::Tensor& weight, const at::Tensor& bias) {
@@ -438,7 +442,7 @@ struct HostSets : Function<HostSets> {
                               which.mutable_data_ptr<int32_t>() + begin * channels);
       };
     });
-    // The bias is added last, since it does not change which member is the largest.
+    // The bias is added last, because it does not change which member is the largest.
     return {largest + bias.detach() * counts.gt(0).unsqueeze(1), rows, which};
   }
 
@@ -459,20 +463,20 @@ struct HostSets : Function<HostSets> {
     const int64_t sets = which.size(0), channels = which.size(1), hidden = hidden_weight.size(0);
     const bool has_norm = context->saved_data["has_norm"].toBool();
     const std::vector<int64_t> begins = begins_of(counts);
-    // Most members of a set are the largest in no channel, so slopes, activations and their gradients have few rows.
+    // Most members are the largest in no channel, so slopes, activations and their gradients have few rows.
     const Blocks blocks(sets, host::kBlockNumbers / (16 * hidden));
     const auto options = weight.options();
     const at::Tensor hidden_weight_sums = at::zeros({blocks.parts(), hidden, rows.size(1)}, options),
                      hidden_bias_sums = at::zeros({blocks.parts(), hidden}, options),
-                     gelu_bias_sums = at::zeros({blocks.parts(), hidden}, options),  // with a norm, discarded
+                     gelu_bias_sums = at::zeros({blocks.parts(), hidden}, options),  // ignored if there is a norm
         weight_sums = at::zeros({blocks.parts(), channels, hidden}, options);
     const at::Tensor hidden_transposed = hidden_weight.t(), gelu_bias = gelu_bias_of(hidden_bias, has_norm);
     blocks.run([&](int64_t part) {
       return [&, part, numbers = std::vector<int32_t>(), places = std::vector<int32_t>(),
               chosen = std::vector<int64_t>(),
               hidden_weight_sum = hidden_weight_sums[part]](int64_t begin, int64_t end) mutable {
-        // Members that are the largest in at least one channel, and the index of each channel's largest member among
-        // them.
+        // Collect the members that are the largest in at least one channel, and for each channel the index of its
+        // largest member among these.
         chosen.clear();
         places.clear();
         const int32_t* its_which = which.const_data_ptr<int32_t>() + begin * channels;
@@ -528,11 +532,11 @@ struct HostSets : Function<HostSets> {
   }
 
  private:
-  // Returns the bias that the GELU adds: zeros with a norm, which has already added it.
+  // Returns the bias that the GELU adds: zeros if there is a norm, because the norm has already added the bias.
   static at::Tensor gelu_bias_of(const at::Tensor& hidden_bias, bool has_norm) {
     return has_norm ? at::zeros_like(hidden_bias) : hidden_bias;
   }
-  // Returns the offset of each set's members among all members, and the total number.
+  // Returns the offset of each set's members among all members, followed by the total number.
   static std::vector<int64_t> begins_of(const at::Tensor& counts) {
     std::vector<int64_t> begins{0};
     const int32_t* const its_counts = counts.const_data_ptr<int32_t>();
@@ -547,11 +551,11 @@ bool is_bf16_on_device(const at::Tensor& x) {
          at::autocast::get_autocast_dtype(at::kCUDA) == at::kBFloat16;
 }
 
-// Largest embeddings of sets on a device, with one pass forward and one backward; see HostSets. The backward pass
-// recomputes the activations of those members that are the largest in at least one channel.
+// Implementation of largest_embedding() on a device, with one forward and one backward pass. The backward pass
+// recomputes the activations of members that are the largest in at least one channel.
 struct DeviceSets : Function<DeviceSets> {
-  /// Computes the largest embeddings. Sets the index of the largest member, u8 [sets, channels], if `which_out` is not
-  /// null.
+  /// Returns the largest embeddings. If `which_out` is not null, it gets the index of the largest member, u8 [sets,
+  /// channels].
   static at::Tensor compute(const at::Tensor& members, const at::Tensor& counts, const SetSize& size,
                             const at::Tensor& hidden_weight, const at::Tensor& hidden_bias, const at::Tensor& weight,
                             const at::Tensor& bias, at::Tensor* which_out) {
@@ -646,8 +650,8 @@ at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::
 }
 
 at::Tensor normalize(const at::Tensor& x) {
-  // Autocast would convert to fp32 and back, which takes two more passes forward and two backward. Sums are in fp32
-  // without autocast, too.
+  // Autocast would convert x to fp32 and back, with two more passes forward and two backward. Without autocast, sums
+  // are in fp32 too.
   const c10::impl::ExcludeDispatchKeyGuard no_autocast(c10::autocast_dispatch_keyset);
   return at::layer_norm(x, {x.size(-1)});
 }

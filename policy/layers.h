@@ -1,6 +1,7 @@
-// Layers of the policies, each with the operations that follow it. On a CUDA device these operations are one pass over
-// memory (rules/network_passes.h) if the sizes allow it. On the host in fp32 they run in blocks that stay in a core's
-// cache (host_passes.h). In all other cases ATen computes them. All layers are differentiable.
+// Layers of the policies, fused with the operations that follow them, such as GELU. On a CUDA device, these operations
+// are one pass over memory if their sizes are supported (rules/network_passes.h). On the host in fp32, they run in
+// blocks that fit a core's cache (host_passes.h). In all other cases, ATen computes them. All layers are differentiable
+// unless a comment says otherwise.
 #pragma once
 
 #include <ATen/ATen.h>
@@ -9,48 +10,50 @@
 
 namespace pictura {
 
-/// GELU of a linear layer. x: [..., in]; weight: [out, in]; bias: [out].
+/// Returns GELU(linear layer of x). x: [..., in]; weight: [out, in]; bias: [out].
 at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias);
 
-/// Layer norm without parameters over the last dimension. The result has the type of x at every precision.
+/// Returns the layer norm of x over the last dimension, without parameters. The result has the type of x, even under
+/// autocast.
 at::Tensor normalize(const at::Tensor& x);
 
-/// GELU of a linear layer whose outputs are normalized before the GELU. Shapes as in linear_gelu().
+/// Returns GELU(layer norm without parameters(linear layer of x)). Shapes as in linear_gelu().
 at::Tensor linear_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias);
 
-/// GELU of a convolution whose input is padded by half the kernel. x: [n, in, height, width]; weight: [out, in, kernel,
-/// kernel], where `in` may be smaller than that of x if the last channels of x are 0; bias: [out].
+/// Returns GELU(convolution of x), where x is padded by half the kernel. x: [n, in, height, width]; weight: [out, in,
+/// kernel, kernel]; bias: [out]. The weight may have fewer input channels than x if the additional channels of x are 0.
 at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride);
 
-/// Layer norm of x + position over the last dimension. x: [..., period, channels]; position: [period, channels], or
-/// undefined for none; weight, bias: [channels].
+/// Returns the layer norm of x + position over the last dimension. x: [..., period, channels]; position: [period,
+/// channels], or undefined for none; weight, bias: [channels].
 at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tensor& weight, const at::Tensor& bias);
 
-/// Whether largest_embedding() supports these members and layers. The host supports all of them. A CUDA device supports
-/// f32 members if it computes in bf16 and SetSize::supports() accepts the layers' sizes.
+/// Whether largest_embedding() supports these members and layers. The host supports all. A CUDA device supports f32
+/// members if layers compute in bf16 and SetSize::supports() accepts their sizes.
 bool has_fused_set_encoder(const at::Tensor& members, const RowFeatures& features, const at::Tensor& hidden_weight,
                            const at::Tensor& weight);
-/// Returns the largest value of each channel over the embeddings of a set's members: [sets, channels], 0 for an empty
-/// set. A member's embedding is computed from the member and its features by a linear layer with GELU
-/// (linear_norm_gelu() if `has_norm`) and a second linear layer. members: [sets, maximum, columns], without gradient;
-/// counts: i32 [sets], number of members of each set.
+/// Embeds all members of entity sets and returns the largest value of each channel over the members of a set: [sets,
+/// channels], 0 for an empty set. Two layers embed a member and its features: linear_gelu() (linear_norm_gelu() if
+/// `has_norm`) and a linear layer. members: [sets, maximum, columns], which get no gradient; counts: i32 [sets], the
+/// number of members of each set.
 at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
                              bool has_norm, const at::Tensor& hidden_weight, const at::Tensor& hidden_bias,
                              const at::Tensor& weight, const at::Tensor& bias);
 
-/// Softmax over tokens. scores: [matrices, tokens, columns].
+/// Returns the softmax over tokens. scores: [matrices, tokens, columns].
 at::Tensor token_softmax(const at::Tensor& scores);
 
-/// Whether feature_rows() supports these rows, [..., columns]: they must be f32, on a CUDA device, and not too wide
-/// (RowSize::kMaxWidth).
+/// Whether feature_rows() supports these rows, [..., columns]: they must be f32 on a CUDA device, and the result must
+/// have at most RowSize::kMaxWidth columns.
 bool has_fused_row_features(const at::Tensor& rows, const RowFeatures& features);
-/// Features of rows, [..., columns], as RowSize describes them, in `type`. Without gradient.
+/// Returns the features of rows, [..., columns], see row_features.h. With `keeps_rows`, the row itself precedes its
+/// features. The result has this `type` and no gradient.
 at::Tensor feature_rows(const at::Tensor& rows, const RowFeatures& features, bool keeps_rows, at::ScalarType type);
 
-/// Converts images, u8 [views, cameras, 3, height, width], to patches: [cameras * views, channels, height / patch_px,
-/// width / patch_px] of `type`, with channels last in memory. Images are padded with black to whole patches. Color c, 0
-/// to 255, of pixel (x, y) of a patch becomes channel (c * patch_px + y) * patch_px + x; further channels are 0.
-/// Without gradient.
+/// Converts images to patches, without gradient. images: u8 [views, cameras, 3, height, width], padded with black to
+/// whole patches; result: [cameras * views, channels, height / patch_px, width / patch_px] of `type`, with channels
+/// last in memory. Color c (0 to 255) of pixel (x, y) of a patch becomes channel (c * patch_px + y) * patch_px + x;
+/// further channels are 0.
 at::Tensor image_patches(const at::Tensor& images, int64_t patch_px, at::ScalarType type);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Device of a network, and arrays in its memory. Has no torch headers: torch_device.cpp implements these functions with
-// torch, and host_device.cpp for builds without torch, which compute on the host.
+// Device on which a network computes, and arrays in its memory. Includes no torch headers: torch_device.cpp implements
+// these functions with torch; host_device.cpp implements them for builds without torch, which compute on the host.
 #pragma once
 
 #include <memory>
@@ -11,21 +11,21 @@
 
 namespace pictura {
 
-/// Returns the device on which this configuration learns, in the process with this local rank. If the configuration
-/// does not specify one of several devices, the rank selects it. Opens torch's CUDA library for a CUDA device. Throws
-/// Error naming the key and the reason if the configuration cannot learn on this device, or if the simulator or the
-/// renderer uses other memory.
+/// Returns the device on which this configuration learns. If the configuration does not select one of several devices,
+/// local_rank, the index of the process on this machine, selects it. Loads torch's CUDA library for a CUDA device.
+/// Throws Error, which names the key of the configuration and the reason, if the configuration cannot learn on this
+/// device, or if the simulator or the renderer uses other memory.
 Device open_learning_device(const Config& config, int local_rank = 0);
 
-/// Torch's current stream of a device, on which the network computes; null on the host. Autograd enqueues the backward
-/// pass on it too.
+/// Returns torch's current stream of a device, or null on the host. The network's forward and backward passes are
+/// enqueued on this stream.
 Stream current_stream(Device device);
 
-/// Returns uninitialised memory of a device, which is freed with the pointer.
+/// Allocates uninitialised memory on a device. The memory is freed with the pointer.
 std::shared_ptr<std::byte> allocate_bytes(size_t bytes, Device device);
 void set_to_zero(std::byte* memory, size_t bytes, Device device);
-/// Copies on the current stream. A copy to the host is complete on return; a copy from the host has read its source,
-/// which may then be freed.
+/// Copies on the current stream. A copy to the host is complete on return. A copy from the host has read its source on
+/// return, so the source may be freed.
 void copy_bytes(std::byte* to, Device to_device, const std::byte* from, Device from_device, size_t bytes);
 
 /// Array in the memory of a device.
@@ -47,7 +47,7 @@ class DeviceArray {
   std::shared_ptr<std::byte> memory_;
 };
 
-/// Copy of host values in the memory of `device`. The host values may be freed afterwards.
+/// Array in the memory of `device` with a copy of host values. The host values may be freed afterwards.
 template <typename T>
 class DeviceCopy : public DeviceArray<T> {
  public:

@@ -1,4 +1,4 @@
-// Sizes that both the policy's layers and the estimate of their memory need.
+// Sizes that both the policy's layers and the estimate of their memory use.
 #pragma once
 
 #include <string_view>
@@ -10,11 +10,12 @@
 
 namespace pictura {
 
-/// Number of ego features. Policies that read images lack the two auxiliary slots, which come last.
+/// Number of ego features that a policy reads. Policies that read images do not read the last two features, which are
+/// auxiliary.
 constexpr int num_ego_features(bool sees_images) { return sees_images ? kEgoFeatures - 2 : kEgoFeatures; }
 
-/// Returns the features to compute for each row of the observation array of this name, which is an entity set or the
-/// waypoints.
+/// Returns the additional features to compute for each row of an observation array (see row_features.h). `array` is the
+/// name of an entity set, or "waypoints".
 inline RowFeatures row_features_of(const PolicySection& policy, std::string_view array) {
   const int points = array == "controls" ? 2 : 1;  // a stop line has two ends
   const bool is_segment = array == "lanes" || array == "boundaries" || array == "walls";
@@ -23,8 +24,8 @@ inline RowFeatures row_features_of(const PolicySection& policy, std::string_view
           .position_unit_m = kScalePosition_m};
 }
 
-/// Number of sines and cosines of a token's position in the image. They give attention the position independently of
-/// the image size.
+/// Number of sines and cosines that encode a token's position in the image. The encoding does not depend on the image
+/// size.
 constexpr int kPositionFeatures = 8;
 
 }  // namespace pictura

@@ -8,7 +8,7 @@ namespace pictura {
 
 namespace {
 
-// Returns an array of the view as a tensor of a given shape. Throws Error naming the array if it has another size.
+// Returns an array as a tensor with this shape. Throws Error, which names the array, if it has another size.
 template <typename T>
 at::Tensor checked_tensor(const char* name, Span<T> array, Device device, at::IntArrayRef shape) {
   PICTURA_CHECK(array.size() == static_cast<size_t>(c10::multiply_integers(shape)),
@@ -110,7 +110,7 @@ std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> vi
   const ImageLayout layout = image_layout(rig, num_views, format, order, as_patches ? patch_px : kDefaultPatch_px);
   std::vector<ImageBlock> blocks =
       as_patches ? allocate_patches(layout, renderer->device()) : allocate_images(rig, {num_views}, renderer->device());
-  // Each block is a separate tensor, whose strides give the start of the image of a view and a camera.
+  // Each block is a separate tensor. Its strides give the position of the image of a view and a camera.
   std::vector<CameraImages> cameras;
   std::vector<int64_t> num_placed(blocks.size());
   for (const CameraLayout& camera : layout.cameras) {

@@ -14,8 +14,9 @@
 
 namespace pictura {
 
-/// Images of the cameras that share one size: planar u8 [batch, cameras of this size, 3, height, width], or patches
-/// (common/patches.h) as bf16 [batch, cameras, rows, columns, values of a patch], stored as [cameras, batch, ...].
+/// Images of the cameras that share one size. `pixels` are planar, u8 [batch, cameras of this size, 3, height, width],
+/// or patches (common/patches.h), bf16 [batch, cameras, rows, columns, values of a patch], whose memory has the order
+/// [cameras, batch, ...].
 struct ImageBlock {
   at::Tensor pixels;
   std::vector<int64_t> cameras;  // indices of these cameras in the rig
@@ -53,7 +54,7 @@ inline constexpr at::Tensor Observation::* kObservationTensors[] = {
 constexpr bool is_set(const ObservationArray& array) {
   return array.part != ObservationPart::own && array.type == ElementType::f32;
 }
-/// Index in EntitySet of kObservationArrays[array_index], for arrays that are sets.
+/// EntitySet of kObservationArrays[array_index], which must be a set.
 constexpr int entity_set_of(size_t array_index) {
   int set = 0;
   for (size_t i = 0; i < array_index; ++i) set += is_set(kObservationArrays[i]);
@@ -61,34 +62,35 @@ constexpr int entity_set_of(size_t array_index) {
 }
 static_assert(entity_set_of(std::size(kObservationArrays)) == kNumEntitySets, "the list and EntitySet have equal sets");
 
-/// Uninitialised storage for the arrays that this configuration's policy reads, [rows, slots, ...].
+/// Allocates uninitialised tensors [rows, slots, ...] for the arrays that this configuration's policy reads.
 Observation allocate_observations(const Config& config, int64_t rows, int64_t slots, Device device);
 
 /// Returns one row of observations whose tensors are [rows, ...].
 Observation row_of(const Observation& rows, int64_t row);
 
-/// Copies arrays in the memory of `device` to the defined tensors of `out`, [slots, ...], in the same memory. Throws
-/// Error naming an array whose size differs from that of its tensor.
+/// Copies arrays to the defined tensors of `out`, [slots, ...]. Arrays and tensors are in the memory of `device`.
+/// Throws Error, which names the array, if the size of an array differs from that of its tensor.
 void copy_arrays(const ObservationView& view, Device device, const Observation& out);
 
-/// Selects agents from the arrays that this configuration's policy reads, in the memory of `device`. indices: i64 [n],
-/// in [0, batch). Throws Error naming an array that does not hold `batch` agents.
+/// Returns the observations of the agents at `indices`, i64 [n] in [0, batch), for the arrays that this configuration's
+/// policy reads. The arrays of `view` are in the memory of `device`. Throws Error, which names the array, if an array
+/// does not have `batch` agents.
 Observation select_arrays(const Config& config, const ObservationView& view, Device device, int64_t batch,
                           const at::Tensor& indices);
-/// Zeroes the auxiliary slots of vectors (see simulator/observation.h), as in a world without them.
+/// Sets all auxiliary features to zero (see simulator/observation.h), as if the simulator did not observe them.
 void hide_auxiliary(Observation* observation_inout);
 
 /// Allocates uninitialised memory for images of a rig, [batch..., cameras of one size, 3, height, width].
 std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> batch, Device device);
 
-/// Draws the images of these views, [views, ...], in the renderer's memory: as patches if `patch_px` is not 0 and the
-/// renderer supports them, else planar.
+/// Draws the images of these views in the memory of the renderer's device and returns them, [views, ...]. They are
+/// patches if `patch_px` is not 0 and the renderer supports patches, else planar.
 std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> views, Renderer* renderer,
                                     int patch_px = 0);
 
-/// Returns the slots, i64 [n] in ascending order, of active agents that the mask [slots] selects (empty: all). With
-/// `with_left` it includes agents that in the last step left a road that ends, since the value of their last
-/// observation is needed.
+/// Returns the slots of the active agents, i64 [n] in ascending order. A nonempty mask [slots] excludes slots with 0.
+/// `with_left` includes agents that left at the end of a road in the last step, because learning needs the value of
+/// their last observation.
 at::Tensor active_slots(const SimulatorArrays& input, Span<const uint8_t> mask, bool with_left,
                         PolicyExecutor* executor);
 

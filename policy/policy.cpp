@@ -19,20 +19,20 @@
 
 namespace pictura {
 
-/// Draws parameters in the order of the calls and stores them by name.
+/// Initializes parameters with random numbers, in the order of calls, and stores them with their names.
 class ParameterMaker {
  public:
   ParameterMaker(uint64_t seed, const at::TensorOptions& options, std::vector<NamedTensor>* parameters_out)
       : seed_(seed), options_(options), parameters_(parameters_out) {}
 
-  /// Draws a normal parameter with standard deviation gain / sqrt(fan_in), where fan_in is the product of all
-  /// dimensions but the first.
+  /// Draws a parameter from a normal distribution with standard deviation gain / sqrt(fan_in), where fan_in is the
+  /// product of all dimensions except the first.
   at::Tensor normal(const std::string& name, at::IntArrayRef shape, double gain) {
     const at::Tensor drawn = at::empty(shape, at::kFloat);
     const double deviation = gain / std::sqrt(static_cast<double>(drawn.numel() / shape[0]));
     float* values = drawn.data_ptr<float>();
     for (int64_t i = 0; i < drawn.numel(); ++i) {
-      // Box-Muller, one stream per element.
+      // Box-Muller transform, with one random stream per element.
       RandomStream stream({.seed = seed_,
                            .world = static_cast<uint32_t>(parameters_->size()),
                            .episode = static_cast<uint32_t>(i),
@@ -64,7 +64,7 @@ class ParameterMaker {
   PolicyNetwork::Linear linear(const std::string& name, int64_t in, int64_t out, double gain) {
     return {normal(name + ".weight", {out, in}, gain), constant(name + ".bias", {out}, 0)};
   }
-  /// Creates the paper's per-group encoder, a 2-layer MLP.
+  /// Creates the paper's encoder of a group of features, a 2-layer MLP.
   PolicyNetwork::GroupEncoder group(const std::string& name, int64_t in, const PolicySection& config) {
     const int64_t width = config.embedding_width;
     return {linear(name + ".hidden", in, width, std::numbers::sqrt2), linear(name + ".out", width, width, 1.0),
@@ -104,7 +104,8 @@ at::Tensor masked_max(const at::Tensor& members, const at::Tensor& counts) {
   return largest.masked_fill((counts == 0).unsqueeze(1), 0);
 }
 
-/// Encodes the entity sets of simulator/observation.h, each through its own MLP and a masked maximum over its members.
+/// Encodes the entity sets of simulator/observation.h. Each set has an MLP, which embeds its members; the embedding of
+/// the set is their channel-wise maximum.
 class VectorEncoder final : public SceneEncoder {
  public:
   /// Creates the encoder. Members with features are converted to `input_type`.
@@ -150,9 +151,9 @@ class VectorEncoder final : public SceneEncoder {
   std::vector<Group> groups_;
 };
 
-/// Encodes images by a convolutional stack or a pretrained program, shared by all cameras. Per camera, learned queries
-/// cross-attend over its feature map and are averaged. All cameras are concatenated and projected to the width of the
-/// four sets that they replace.
+/// Encodes images. Convolutions or a pretrained program, shared by all cameras, compute feature maps. For each camera,
+/// learned queries attend to the feature map, and their results are averaged. The results of all cameras are
+/// concatenated and projected to the width of the four sets that they replace.
 class PerspectiveEncoder final : public SceneEncoder {
  public:
   /// Creates the encoder. Images are converted to `image_type`.
@@ -253,7 +254,7 @@ class PerspectiveEncoder final : public SceneEncoder {
   }
 
   // Returns the features of a block's cameras, [cameras, batch, width]. The mean over queries is computed before the
-  // MLP's last layer, which is linear, so that the product has one row instead of num_queries rows.
+  // MLP's last layer, which is linear, so that this layer processes one row instead of num_queries rows.
   at::Tensor pool(const ImageBlock& block) const {
     const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1);
     const at::Tensor x = backbone_ ? backbone_->forward(block.pixels) : convolve(block.pixels);
@@ -270,11 +271,12 @@ class PerspectiveEncoder final : public SceneEncoder {
     return pooled.mean(2) + apply(mlp_out_, hidden.mean(2));
   }
 
-  // Computes attention of each camera's queries [cameras, queries, width] over the tokens of its images [cameras *
-  // batch, tokens, width]; returns [cameras * batch, queries, width]. Queries are parameters, equal for all images, so
-  // keys and values need not be computed for each token. Scores are computed directly from tokens by q (W t) = (q W) t.
-  // The value and output layers are one product with the weighted sums of tokens. A key bias would add the same number
-  // to all scores of a query, which softmax ignores. The value bias is added once, since attention weights sum to 1.
+  // Computes the attention of each camera's queries, [cameras, queries, width], to the tokens of its images, [cameras *
+  // batch, tokens, width]. Returns [cameras * batch, queries, width]. Queries are parameters, equal for all images, so
+  // keys and values of single tokens are not needed: scores are (q W) t instead of q (W t), and the value and output
+  // layers are applied to the weighted sums of tokens, as one product. There is no key bias, because it would add the
+  // same number to all scores of a query, which does not change the softmax. The value bias is added once, because
+  // attention weights sum to 1.
   at::Tensor attend(const at::Tensor& queries, const at::Tensor& tokens) const {
     const int64_t cameras = queries.size(0), heads = config_.attention_heads, head_width = width_ / heads;
     const at::Tensor key = key_.unflatten(0, {heads, head_width});
@@ -293,7 +295,7 @@ class PerspectiveEncoder final : public SceneEncoder {
   const PolicySection config_;
   const int num_cameras_;
   const at::ScalarType image_type_;
-  const std::unique_ptr<ImageBackbone> backbone_;  // null: the convolutions are used
+  const std::unique_ptr<ImageBackbone> backbone_;  // null: convolutions are used
   const int64_t width_;
   std::vector<PolicyNetwork::Linear> convolutions_;  // weights are [out, in, kernel, kernel]
   at::Tensor queries_, key_;
@@ -323,14 +325,14 @@ PolicyNetwork::PolicyNetwork(const PolicySection& config, int num_cameras, uint6
   for (int i = 0; i < config.backbone_layers; ++i) {
     backbone_.push_back(make.linear(fmt::format("backbone.{}", i), i == 0 ? in : inside, inside, std::numbers::sqrt2));
   }
-  // The actor head is small, so that all actions are about equally likely at first.
+  // The initial weights of the actor head are small, so that all actions are about equally likely at first.
   actor_ = make.linear("actor", inside, kNumActions, 0.01);
   critic_ = make.linear("critic", inside, 1, 1.0);
 }
 
 at::Tensor PolicyNetwork::run_trunk(at::Tensor x) const {
   for (size_t i = 0; i < backbone_.size(); ++i) {
-    // The first layer has another input width, that of the encoders' concatenated outputs.
+    // The input of the first layer, the concatenated outputs of the encoders, has another width.
     const bool is_first = i == 0;
     const at::Tensor y = apply_gelu(backbone_[i], layer_norm_ && !is_first ? normalize(x) : x);
     x = residual_ && !is_first ? x + y : y;

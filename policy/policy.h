@@ -1,6 +1,7 @@
 // The paper's two policies (appendix, table of the policy architecture). Both have the same trunk with actor and
-// critic. Before the trunk, the vector policy has encoders of four entity sets (five with walls), and the image policy
-// has one image branch as wide as the four encoders. Plain tensors and functions, no torch modules.
+// critic. Before the trunk, the vector policy has encoders of four entity sets (five with walls). The image policy
+// instead has an image encoder whose output is as wide as those of the four encoders together. The code uses tensors
+// and functions, but no torch modules.
 #pragma once
 
 #include <functional>
@@ -23,19 +24,19 @@ struct NamedTensor {
   at::Tensor value;
 };
 
-/// Hash of the parameters' bytes in their order: 16 hexadecimal digits.
+/// Returns the hash of the parameters' bytes in their order: 16 hexadecimal digits.
 std::string hash_of_parameters(const std::vector<NamedTensor>& parameters);
 
 class ImageBackbone;
 
-/// Encodes the surroundings of an agent into one embedding.
+/// Network that encodes the surroundings of each agent as one embedding.
 class SceneEncoder {
  public:
   virtual ~SceneEncoder() = default;
   virtual at::Tensor forward(const Observation& observation) const = 0;
   /// Width of the embedding.
   virtual int64_t width() const = 0;
-  /// Program that replaces the convolutions, or null.
+  /// Pretrained program that replaces the convolutions, or null.
   virtual const ImageBackbone* image_backbone() const { return nullptr; }
   /// See Policy::drawn_patch_px.
   virtual int drawn_patch_px() const { return 0; }
@@ -51,7 +52,7 @@ class Policy {
 
   struct Output {
     at::Tensor logits;  // [batch, kNumActions]
-    at::Tensor value;   // [batch], in units of rewards
+    at::Tensor value;   // [batch], in units of the reward
   };
   virtual Output forward(const Observation& observation) const = 0;
 
@@ -59,12 +60,12 @@ class Policy {
   int64_t num_parameters() const;
   /// Hash of parameters(), see hash_of_parameters().
   std::string hash() const;
-  /// Hash of the file of policy.backbone; empty if policy.backbone is "conv", and for vector policies.
+  /// Hash of the file policy.backbone; empty for vector policies and if policy.backbone is "conv".
   virtual std::string backbone_hash() const { return ""; }
-  /// Throws Error naming camera and file if the program of policy.backbone does not support these images.
+  /// Throws Error, which names camera and file, if the program policy.backbone does not support the images of the rig.
   virtual void check_images(const Rig& /*rig*/) const {}
-  /// Side in px of the patches in which the policy can read images (ImageBlock); 0 if it reads planar images only. The
-  /// first convolution reads such patches directly, so that no conversion follows drawing.
+  /// Side in px of the patches that the policy can read as images (ImageBlock); 0 if it reads only planar images. If
+  /// the renderer draws such patches, images need no conversion before the first convolution.
   virtual int drawn_patch_px() const { return 0; }
 
  protected:
@@ -74,9 +75,9 @@ class Policy {
 /// The paper's actor-critic network.
 class PolicyNetwork final : public Policy {
  public:
-  /// Draws parameters, each keyed only by (seed, index of the parameter, index of the element). Parameters of a program
-  /// (policy.backbone) start from the program's file instead. With `reads_walls` the vector policy has a fifth set. The
-  /// host supports bf16, slowly; for tf32 it computes in fp32.
+  /// Initializes parameters with random numbers that depend only on seed, index of the parameter and index of the
+  /// element. Parameters of a program (policy.backbone) are read from its file instead. With `reads_walls`, a vector
+  /// policy encodes walls too. The host supports bf16, but slowly; for tf32 it computes in fp32.
   PolicyNetwork(const PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
                 bool reads_walls = false, Device device = {}, Precision precision = Precision::fp32);
 
@@ -89,7 +90,7 @@ class PolicyNetwork final : public Policy {
   std::unique_ptr<SceneEncoder> scene_;
   at::ScalarType type_;
   Precision precision_;
-  int64_t ego_features_;  // the image branch lacks the auxiliary slots
+  int64_t ego_features_;  // see num_ego_features()
   RowFeatures waypoint_features_;
 
   struct Linear {
@@ -111,24 +112,24 @@ class PolicyNetwork final : public Policy {
   friend class PerspectiveEncoder;
 };
 
-/// Creates the policy of a configuration, for the cameras of a rig. The host computes in fp32. Throws Error naming the
-/// file if the program of policy.backbone cannot be used.
+/// Creates the policy of a configuration, for the cameras of a rig. The host computes in fp32. Throws Error, which
+/// names the file, if the program policy.backbone cannot be used.
 std::unique_ptr<const Policy> make_policy(const Config& config, const Rig& rig, Device device);
 
-/// Multiplies the policy's logits by a factor, by scaling the parameters of the layer that computes them.
+/// Multiplies the policy's logits by a factor: scales the parameters of the layer that computes the logits.
 void scale_logits(const Policy& policy, double factor);
 
-/// Policy outputs for a whole batch without gradients: logits and log-probabilities [batch, actions], values [batch].
+/// Outputs of a policy for a batch, without gradients: logits and log-probabilities [batch, actions], values [batch].
 struct Decision {
   at::Tensor logits, log_probs, value;
 
-  /// Returns whether all logits and values are finite, as a bool tensor in their memory.
+  /// Returns whether all logits and values are finite, as a bool tensor on their device.
   at::Tensor are_finite() const;
   /// Whether all logits and values are finite. Waits for the device.
   bool is_finite() const { return are_finite().item<bool>(); }
 };
-/// Runs the policy for the agents of `rows`, i64 [batch], chunk by chunk. act(rows) returns the policy's output for a
-/// chunk's rows; the output need not outlast the next call.
+/// Runs the policy for the agents with row numbers `rows`, i64 [batch], chunk by chunk. act(rows) must return the
+/// policy's output for the rows of a chunk; the output need only be valid until the next call.
 Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
                 const std::function<Policy::Output(const at::Tensor& rows)>& act);
 

@@ -10,10 +10,11 @@
 
 namespace pictura {
 
-/// Returns the observation schema: shapes of the policy's input and output arrays, which define the meaning of its
-/// numbers. A policy cannot drive if its schema differs from the current one.
+/// Returns the observation schema: names and shapes of the policy's input and output arrays. A policy whose schema
+/// differs from the current schema cannot be used.
 nlohmann::ordered_json schema_to_json(const Config& config);
-/// Throws Error naming the file and the entry in which the saved schema differs from the current schema of `config`.
+/// Throws Error if the saved schema differs from the current schema of `config`; the message names the file and the
+/// first different entry.
 void check_schema(const nlohmann::ordered_json& saved, const Config& config, const std::string& path);
 
 nlohmann::ordered_json rig_to_json(const Rig& rig);

@@ -10,12 +10,12 @@ namespace pictura {
 void set_float32_products(Precision precision) {
   at::Context& context = at::globalContext();
   const bool is_tf32 = precision == Precision::tf32;
-  // Torch's older switches must agree with its newer ones; otherwise reading the older ones throws, for instance in
-  // torch's exporter to ONNX.
+  // Torch's older settings must agree with its newer settings; otherwise reading the older settings throws, for
+  // instance in torch's exporter to ONNX.
   context.setAllowTF32CuDNN(is_tf32);
   context.setAllowTF32CuBLAS(is_tf32);
-  // The precision is set for each operation, since the setting for all operations does not change convolutions, which
-  // use TF32 by default.
+  // The precision is set for each operation, because torch's setting for all operations does not affect convolutions,
+  // which use TF32 by default.
   for (const at::Float32Op operation : {at::Float32Op::CONV, at::Float32Op::RNN, at::Float32Op::MATMUL}) {
     context.setFloat32Precision(at::Float32Backend::CUDA, operation,
                                 is_tf32 ? at::Float32Precision::TF32 : at::Float32Precision::IEEE);
@@ -34,8 +34,8 @@ void set_reproducible(bool reproducible) {
   }
   at::Context& context = at::globalContext();
   context.setDeterministicAlgorithms(reproducible, /*warn_only=*/false);
-  // With this setting torch fills all new memory, so that reads of unwritten memory are deterministic. No code here
-  // reads unwritten memory.
+  // Torch would fill all new memory, so that reads of uninitialised memory are deterministic. This is not needed,
+  // because no code here reads uninitialised memory.
   context.setDeterministicFillUninitializedMemory(false);
   context.setDeterministicCuDNN(reproducible);
 }

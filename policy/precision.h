@@ -1,5 +1,5 @@
-// Arithmetic of the network on a CUDA device, and whether it gives the same bits in every run. Parameters, the
-// optimizer, heads, log-probabilities and losses are fp32 at every precision.
+// Precision and reproducibility of the network's arithmetic on a CUDA device. Parameters, the optimizer, actor and
+// critic heads, log-probabilities and losses are fp32 at every precision.
 #pragma once
 
 #include <ATen/autocast_mode.h>
@@ -8,18 +8,18 @@
 
 namespace pictura {
 
-/// Sets how torch computes products of fp32 numbers, for the whole process: IEEE arithmetic, or TF32.
+/// Sets, for the whole process, whether torch computes products of fp32 numbers in IEEE arithmetic or in TF32.
 void set_float32_products(Precision precision);
 
-/// Sets, for the whole process, whether torch computes the same bits in every run: deterministic algorithms, including
-/// cuDNN's, and a workspace that makes cuBLAS reproducible. Torch and cuBLAS read the workspace from the environment
-/// variable CUBLAS_WORKSPACE_CONFIG at their first product on a device, so this function must be called earlier. Throws
-/// Error if that variable has another value.
+/// Sets, for the whole process, whether torch computes the same bits in every run. If so, torch and cuDNN use
+/// deterministic algorithms, and cuBLAS uses a workspace that makes it reproducible. Torch and cuBLAS read the size of
+/// the workspace from the environment variable CUBLAS_WORKSPACE_CONFIG at their first product on a device, so call this
+/// function earlier. Throws Error if the variable already has a different value.
 void set_reproducible(bool reproducible);
 
-/// Scope in which cuDNN times its algorithms for every new size and selects the fastest (its autotuner), unless torch
-/// is set to be reproducible. Use it only for updates, since rollouts have a new size for every number of active
-/// agents.
+/// Scope in which cuDNN times its algorithms for every new size and selects the fastest (autotuning). Has no effect if
+/// torch is set to be reproducible. Use it only for updates of the policy: in rollouts, the size changes with the
+/// number of active agents.
 class Autotuner {
  public:
   Autotuner();
@@ -39,7 +39,7 @@ class LayerPrecision {
   }
   ~LayerPrecision() {
     if (!is_bf16_) return;
-    // Weights are cast once per scope, since the optimizer changes them between scopes.
+    // The cache of cast weights is valid only within a scope, because the optimizer changes weights between scopes.
     if (at::autocast::decrement_nesting() == 0) at::autocast::clear_cache();
     at::autocast::set_autocast_enabled(device_, false);
   }

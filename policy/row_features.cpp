@@ -6,7 +6,8 @@ namespace pictura {
 
 namespace {
 
-// Converts pairs of metres [..., 2] to four numbers, two of which resolve near positions and two far positions.
+// Converts pairs of coordinates [..., 2] in metres to four numbers: two resolve near positions, and two resolve far
+// positions.
 at::Tensor near_and_far(const at::Tensor& pairs_m) {
   const at::Tensor size_m = pairs_m.abs();
   return at::cat({pairs_m / (size_m + double{kNearPoint_m}), pairs_m / (size_m + double{kFarPoint_m})}, -1);

@@ -22,7 +22,7 @@ std::string safetensors(const std::vector<SafeTensor>& tensors, const nlohmann::
         {"dtype", name_of(tensor.type)}, {"shape", tensor.shape}, {"data_offsets", {begin, data.size()}}};
   }
   std::string text = json_text(header);
-  text.append((8 - text.size() % 8) % 8, ' ');  // data begin at a multiple of eight bytes
+  text.append((8 - text.size() % 8) % 8, ' ');  // padding, so that the data begin at a multiple of 8 bytes
   const uint64_t length = text.size();
   const std::string file(reinterpret_cast<const char*>(&length), sizeof length);
   return file + text + data;

@@ -1,4 +1,4 @@
-// Policy in a file (policy/stored_policy.h), with weights as tensors of torch.
+// Variant of policy/stored_policy.h with weights as torch tensors.
 #pragma once
 
 #include "pictura/policy/policy.h"
@@ -19,16 +19,16 @@ SavedPolicy read_policy(const std::string& path, bool average = false);
 SavedPolicy parse_policy(const std::string& file, const std::string& path, bool average = false);
 void write_policy(const std::string& path, const SavedPolicy& policy, WeightType type, const std::string& commit);
 
-/// Copies `saved`, read from the file `path`, into `parameters` in place. Throws Error naming the file and the first
-/// tensor that is missing, of another shape, or not finite.
+/// Copies `saved`, read from the file `path`, into `parameters` in place. Throws Error, which names the file and the
+/// tensor, if a tensor is missing, has another shape, or is not finite.
 void restore_tensors(const std::string& path, const std::vector<NamedTensor>& saved,
                      const std::vector<NamedTensor>& parameters);
 
-/// Copies the saved parameters into a policy. Throws Error as restore_tensors() does, and if the programs of their
-/// backbones differ.
+/// Copies the saved parameters into a policy. Throws Error as restore_tensors() does, and if policy.backbone is a
+/// different program.
 void restore_policy(const SavedPolicy& saved, const Policy& policy);
 
-/// Writes tensors as safetensors, in F32 or I64, with one entry of metadata: config.
+/// Writes tensors as a safetensors file, in F32 or I64. Its metadata contain one entry: config.
 void write_safetensors(const std::string& path, const std::vector<NamedTensor>& tensors,
                        const std::string& config_toml);
 

@@ -1,4 +1,4 @@
-// Implementation of PolicySession: its settings, and the interface of the code that computes the policy.
+// Base class of PolicySession's implementations: its settings, and the interface of the code that computes the policy.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,7 @@ struct SessionParts {
   SessionParts(const SessionParts&) = delete;
   SessionParts& operator=(const SessionParts&) = delete;
 
-  /// These functions implement the functions of the same names in PolicySession.
+  /// The following functions implement those with the same names in PolicySession.
   virtual std::string policy_hash() const = 0;
   virtual std::unique_ptr<SessionParts> make_untrained(uint64_t seed) const = 0;
   virtual void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out,
@@ -31,18 +31,18 @@ struct SessionParts {
   const double camera_severity;
 
  protected:
-  /// Throws Error if a policy with images lacks renderer, scene or views, or if their sizes do not fit the batch.
+  /// Throws Error if the renderer, the scene or views are missing, or if their sizes do not fit the batch.
   void check_images(const PolicyInput& input, size_t batch, const Renderer* renderer) const;
-  /// Throws Error naming the precision if the policy's outputs are not finite.
+  /// Throws Error, which names the precision, if the policy's outputs are not finite.
   void check_outputs(bool are_finite) const;
 };
 
-/// Returns the rig of the options, else the rig of training. Both are possible, since no weight depends on sizes or
-/// poses of cameras. Throws as PolicySession does.
+/// Returns the rig of the options if they define one, else the rig of training. A policy can use other cameras, because
+/// no weight depends on sizes or poses of cameras. Throws as PolicySession does.
 Rig chosen_rig(const PolicyFacts& saved, const SessionOptions& options);
 
-/// Open a session in which torch, or the host without torch (policy/host_network.h), computes the policy.
-/// open_host_session() throws Error if the options specify another device, or if a program replaces the convolutions.
+/// Open a session in which torch or policy/host_network.h computes the policy. open_host_session() throws Error if the
+/// options specify another device than the host, or if policy.backbone is a program.
 std::unique_ptr<SessionParts> open_torch_session(const std::string& path, const SessionOptions& options);
 std::unique_ptr<SessionParts> open_host_session(const std::string& path, const SessionOptions& options);
 

@@ -25,7 +25,7 @@ using nlohmann::ordered_json;
 constexpr std::string_view kNoHash = "0000000000000000";
 constexpr size_t kLengthBytes = sizeof(uint64_t);
 
-// Converts a tensor to the form in files.
+// Converts a tensor to the form in which files store it.
 SafeTensor safe_tensor(const StoredTensor& tensor, WeightType weights) {
   if (weights == WeightType::f32) {
     return {tensor.name,
@@ -42,8 +42,8 @@ SafeTensor safe_tensor(const StoredTensor& tensor, WeightType weights) {
   return result;
 }
 
-// Returns the hash of the whole file, in which the digits of `hash` in the metadata are replaced by zeros; empty if the
-// metadata do not contain `hash`.
+// Returns the hash of the whole file with zeros in place of the digits of `hash` in the metadata. Returns an empty
+// string if the metadata do not contain `hash`.
 std::string hash_of_file(std::string file, const std::string& hash) {
   const std::string key = R"("hash":")";
   const size_t place = file.find(key + hash);

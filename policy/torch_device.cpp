@@ -12,8 +12,8 @@ namespace pictura {
 
 namespace {
 
-// Returns the reason why torch cannot compute on CUDA devices; empty if it can. Opens torch's CUDA library here instead
-// of linking it, so that programs start on machines without it.
+// Returns the reason why torch cannot compute on CUDA devices; empty if it can. Torch's CUDA library is loaded here and
+// not linked, so that programs also start on machines without it.
 std::string torch_cuda_unavailable_reason() {
   static const void* const library = dlopen("libtorch_cuda.so", RTLD_NOW | RTLD_GLOBAL | RTLD_NODELETE);
   if (!library) return "this torch has no CUDA (libtorch_cuda.so cannot be opened): install a torch with CUDA";
@@ -31,8 +31,8 @@ std::string cuda_rejection_reason() {
 Device open_learning_device(const Config& config, int local_rank) {
   const std::string &wanted = config.run.device, &simulator = config.simulator.backend,
                     &renderer = config.render.backend;
-  // This must precede all computation, even on the host. Torch looks for its CUDA library only once, and a process that
-  // learns on the host may use a device later.
+  // Torch's CUDA library must be loaded before all computation, even on the host: torch looks for it only once, and a
+  // process that learns on the host may use a device later.
   const std::string why_not = cuda_rejection_reason();
   const bool draws_on_host =
       config.reads_images() && (renderer == "cpu" || renderer == "null" || renderer == "gl:osmesa");
@@ -146,7 +146,7 @@ void OwnStream::run(const std::function<void()>& work) const {
   try {
     work();
   } catch (...) {
-    stream_.synchronize();  // the work on tensors completes before code that catches the exception reads them
+    stream_.synchronize();  // code that catches the exception may read tensors of this work
     throw;
   }
   stream_.synchronize();

@@ -1,4 +1,4 @@
-// Sessions whose policy torch computes.
+// Sessions in which torch computes the policy.
 #include <ATen/Parallel.h>
 
 #include "pictura/backends/make_policy_executor.h"
@@ -20,14 +20,15 @@ Config with_seed(Config config, uint64_t seed) {
   return config;
 }
 
-// Returns the configuration with cameras mounted as in the rig, even if they were randomized in training.
+// Returns the configuration without randomization of cameras.
 Config as_mounted(Config config) {
   config.render.randomization = {};
   return config;
 }
 
 struct TorchSession final : SessionParts {
-  /// its_policy: null for a policy that this object owns, whose weights are drawn from the configuration's seed.
+  /// its_policy: a policy that another object owns, or null. If null, this object creates the policy, with weights from
+  /// the configuration's seed.
   TorchSession(const Config& its_config, Device its_device, const Rig& its_rig, double its_camera_severity,
                const Policy* its_policy = nullptr)
       : SessionParts(its_config, its_device, its_rig, its_camera_severity),
@@ -132,8 +133,8 @@ class TorchController final : public PolicyController {
   ActionChoice choice_;
   bool hides_auxiliary_;
   DecisionClock clock_;
-  int64_t step_ = 0;    // calls of act()
-  at::Tensor actions_;  // i32 [slots], held until the next decision
+  int64_t step_ = 0;    // number of calls of act()
+  at::Tensor actions_;  // i32 [slots] actions that agents hold until their next decision
   int64_t num_driven_ = 0;
 };
 

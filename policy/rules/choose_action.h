@@ -1,5 +1,5 @@
-// Chooses an action from the log-probabilities of one agent: the most likely action, or a draw. Draws are keyed by
-// (seed, global world, agent, episode, step), so they do not depend on an order or a device.
+// Chooses an action from the log-probabilities of one agent: the most likely action or a random draw. The random number
+// depends only on (seed, global world, agent, episode, step), so draws are equal on all devices.
 #pragma once
 
 #include "pictura/common/math.h"
@@ -30,7 +30,7 @@ PICTURA_HD inline int32_t draw_action(const float* log_probs, int num_actions, f
 /// Key of the random draw of an action: agent and time.
 struct ActionKey {
   uint64_t seed;
-  uint32_t global_world, agent, episode, step;  // agent: number within its world
+  uint32_t global_world, agent, episode, step;  // agent: index in its world
 };
 
 PICTURA_HD inline int32_t draw_action(const float* log_probs, int num_actions, const ActionKey& key) {
@@ -45,11 +45,11 @@ PICTURA_HD inline int32_t draw_action(const float* log_probs, int num_actions, c
 
 /// Rule by which actions are chosen from their log-probabilities.
 struct ActionChoice {
-  bool argmax = false;  // the most likely action; else a draw
+  bool argmax = false;  // true: the most likely action; false: a random draw
   uint64_t seed = 0;    // seed of the draws
 };
 
-/// Chooses the action of the agent in a slot, for both devices.
+/// Chooses the action of the agent in a slot. Runs on hosts and GPUs.
 struct ActionRule {
   SlotTable slots;
   Span<const int32_t> episode_index, episode_step;  // [worlds]
@@ -76,11 +76,11 @@ PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t>
   commands_out[slot].action = actions[slot];
 }
 
-/// Slots whose agents are drawn, encoded and commanded.
+/// Test whether the policy is evaluated for the agent in a slot.
 struct DecidingSlots {
   const AgentStatus* status;
-  Span<const uint8_t> mask;  // [slots] excludes slots with 0; empty: excludes none
-  const uint8_t* left;       // [slots] includes agents that have just left a road that ends; null: includes none
+  Span<const uint8_t> mask;  // [slots] 0: the slot is excluded; empty: no slot is excluded
+  const uint8_t* left;       // [slots] 1: the agent has just left the map and is included; null: none
 
   PICTURA_HD bool operator()(int64_t slot) const {
     const bool is_asked = takes_actions(status[slot]) || (left != nullptr && left[slot] != 0);

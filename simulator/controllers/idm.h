@@ -24,8 +24,8 @@ struct IdmParameters {
   float look_ahead_m = 10;
 };
 
-/// Returns the acceleration for a gap to the road user in front, who drives at front_mps. An infinite gap means that
-/// there is nobody in front.
+/// Returns the acceleration for a gap to the road user in front and its speed. An infinite gap means that there is no
+/// road user in front.
 float idm_acceleration(const IdmParameters& parameters, float speed_mps, float gap_m, float front_mps);
 
 /// Path of an agent: positions of its reference point with headings. Each position is at least kMinPiece_m from the
