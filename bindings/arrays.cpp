@@ -69,7 +69,7 @@ std::optional<ElementType> element_type_of(DLDataType type) {
   return {};
 }
 
-/// NumPy's name of an element type; it has none for bf16.
+/// Returns NumPy's name of an element type. NumPy has no bf16.
 std::string numpy_name(const LentArray& lent) {
   if (lent.is_bool) return "bool";
   switch (lent.array.type) {
@@ -86,7 +86,7 @@ std::string numpy_name(const LentArray& lent) {
   return "";
 }
 
-/// NumPy's type; common types avoid a look-up by name.
+/// Returns the NumPy type. Common types are selected without a slow look-up by name.
 py::dtype numpy_type(const LentArray& lent) {
   if (lent.is_bool) return py::dtype::of<bool>();
   switch (lent.array.type) {
@@ -103,13 +103,13 @@ std::vector<int64_t> values_of(const Dims& dims) {
   return values;
 }
 
-/// Tensor that lends a LentArray, in one of DLPack's two forms.
+/// DLPack tensor, in the versioned or older form, with the memory of a LentArray.
 template <typename Managed>
 struct Lending {
   Managed managed;
   std::vector<int64_t> shape, strides;
   std::shared_ptr<const void> owner;
-  std::vector<uint8_t> copy;  // memory, if a copy was requested
+  std::vector<uint8_t> copy;  // the tensor's memory if a copy was requested
 
   static Managed* make(const LentArray& lent, bool copied) {
     auto lending = std::make_unique<Lending>();
@@ -129,7 +129,7 @@ struct Lending {
     tensor.shape = lending->shape.data();
     tensor.strides = lending->strides.data();
     lending->managed.manager_ctx = lending.get();
-    // The owner is C++ memory, so it is released without the GIL.
+    // The owner is a C++ object, so it can be released without the GIL.
     lending->managed.deleter = [](Managed* self) { delete static_cast<Lending*>(self->manager_ctx); };
     return &lending.release()->managed;
   }
@@ -151,7 +151,7 @@ struct Lending {
   }
 };
 
-/// Frees the tensor of a capsule that no consumer has taken.
+/// Frees the tensor of a capsule if no consumer has taken it.
 void drop_versioned(PyObject* capsule) {
   if (!PyCapsule_IsValid(capsule, kVersionedName)) return;
   auto* tensor = static_cast<DLManagedTensorVersioned*>(PyCapsule_GetPointer(capsule, kVersionedName));
@@ -170,7 +170,8 @@ void drop_older(PyObject* capsule) {
 
 constexpr const char* kStream = "a stream as int, or None";
 
-/// Orders a consumer's work on `stream`, in DLPack's numbering, after the library's work on the array's stream.
+/// Makes the consumer's stream wait for the library's work on the array's stream. `stream` is a stream number as DLPack
+/// defines it.
 void order_before(const LentArray& lent, const py::object& stream) {
   if (lent.array.device.is_host()) {
     if (!stream.is_none() && cast_checked<int64_t>(stream, lent.what, kStream) != -1) {
@@ -248,7 +249,7 @@ py::array numpy_of(const py::object& self) {
     strides.push_back(lent.array.strides[i] * static_cast<py::ssize_t>(bytes_of(lent.array.type)));
   }
   py::array view(numpy_type(lent), shape, strides, lent.array.data, self);
-  // Equivalent to setflags(write=False), which takes as long as everything else.
+  // Equivalent to setflags(write=False), but much faster.
   if (lent.array.is_read_only) {
     py::detail::array_proxy(view.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
   }
@@ -284,12 +285,12 @@ void check_tensor(const DLTensor& tensor, std::string_view what, Array* array_ou
   *array_out = Array(first, *type, shape, device);
   if (!tensor.strides) return;
   for (int i = 0; i < tensor.ndim && shape.count() > 0; ++i) {
-    // The stride along a single element has no meaning.
+    // The stride of a dimension of length 1 has no meaning.
     if (shape[i] != 1) array_out->strides[i] = tensor.strides[i];
   }
 }
 
-/// Returns the capsule of an object on the host or, on CUDA, ordered before later work on the stream.
+/// Returns the DLPack capsule of an object. If the object is on a CUDA device, `stream` waits for pending work on it.
 py::object capsule_of(const py::handle& object, [[maybe_unused]] std::string_view what,
                       [[maybe_unused]] Stream stream) {
   const auto device = py::cast<std::pair<int32_t, int32_t>>(py::tuple(object.attr("__dlpack_device__")()));
@@ -308,7 +309,7 @@ py::object capsule_of(const py::handle& object, [[maybe_unused]] std::string_vie
   } catch (const py::error_already_set& error) {
     if (!error.matches(PyExc_TypeError)) throw;
   }
-  // Lender with an interface older than DLPack 1.0.
+  // The object has an interface older than DLPack 1.0.
   PyDict_DelItemString(arguments.ptr(), "max_version");
   return lend(**arguments);
 }
@@ -341,7 +342,7 @@ BorrowedArray& BorrowedArray::operator=(BorrowedArray&& other) noexcept {
 
 BorrowedArray::~BorrowedArray() {
   if (!versioned_ && !older_ && !keep_) return;
-  // The lender may be a Python object.
+  // The deleters may release Python objects.
   const py::gil_scoped_acquire gil;
   if (versioned_ && versioned_->deleter) versioned_->deleter(versioned_);
   if (older_ && older_->deleter) older_->deleter(older_);

@@ -1,5 +1,5 @@
-// Arrays between C++ and Python: `pictura.Array`, which lends library memory through DLPack and NumPy, and arrays of
-// callers, which are accessed through DLPack and never copied.
+// Exchange of arrays between C++ and Python without copies. `pictura.Array` gives Python access to the library's memory
+// through DLPack and NumPy. Arrays of Python callers are accessed through DLPack.
 #pragma once
 
 #include <memory>
@@ -19,19 +19,21 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// Returns lengths or strides of any rank that Dims supports. Throws Error for higher ranks.
+/// Converts lengths or strides to Dims. Throws Error if their number exceeds the maximum rank of Dims.
 Dims dims_of(const std::vector<int64_t>& values);
 
-/// Array that its owner keeps alive: it outlives the simulator or renderer that wrote it.
+/// Array of the library that Python can access (pictura.Array). `owner` keeps its memory alive, even after the Python
+/// object that returned the array is gone.
 struct LentArray {
   Array array;
   std::shared_ptr<const void> owner;
-  Stream stream;         // stream of the work on it; null: CUDA's legacy default stream
-  bool is_bool = false;  // u8 with values 0 and 1
+  Stream stream;         // stream of work on the array; null: CUDA's legacy default stream
+  bool is_bool = false;  // whether u8 elements are bools
   std::string what;      // name in messages
 };
 
-/// Array of a caller, at its own address. Holds a reference to the lender.
+/// Array of a Python caller, accessed in the caller's memory. Holds a reference to the Python object that owns the
+/// memory.
 class BorrowedArray {
  public:
   BorrowedArray() = default;
@@ -50,15 +52,18 @@ class BorrowedArray {
   dlpack::DLManagedTensor* older_ = nullptr;
 };
 
-/// Accesses an array of the caller: a LentArray or any object with DLPack (NumPy, torch, JAX, CuPy). Pending writes of
-/// a device are ordered before later work on `stream`. Throws Error naming `what` for other objects, unsupported
-/// element types, and devices other than the host and CUDA's. The caller must hold the GIL.
+/// Returns access to an array of a Python caller: a LentArray or any object that supports DLPack (NumPy, torch, JAX,
+/// CuPy). Later work on `stream` waits for pending writes to the array on a device. Throws Error, whose message names
+/// `what`, for other objects, unsupported element types, and devices other than the host and CUDA devices. The caller
+/// must hold the GIL.
 BorrowedArray borrow(const py::handle& object, std::string_view what, Stream stream);
 
-/// Borrows a NumPy array of structs as bytes, [count, size] u8 on the host; anything else as borrow() does.
+/// Variant of borrow() that also accepts NumPy arrays of structs of `size` bytes. The result is then u8 [count, size]
+/// on the host.
 BorrowedArray borrow_structs(const py::handle& object, std::string_view what, size_t size, Stream stream);
 
-/// Converts a Python value. Throws UsageError with the expected kind if the value is of another kind.
+/// Converts a Python value to T. Throws UsageError if that is impossible; the message contains `what`, `expected` and
+/// the value.
 template <typename T>
 T cast_checked(const py::handle& value, std::string_view what, std::string_view expected) {
   try {
@@ -68,7 +73,7 @@ T cast_checked(const py::handle& value, std::string_view what, std::string_view 
   }
 }
 
-/// Name of an object's class, for messages.
+/// Returns the name of an object's class, for messages.
 std::string type_name_of(const py::handle& object);
 
 void bind_arrays(py::module_& module);

@@ -7,12 +7,12 @@
 namespace pictura::python {
 
 namespace {
-// Process that first needed threads, or CUDA; 0: none yet. A child inherits its parent's numbers.
+// Id of the process that first used threads or CUDA; 0: none yet. A child of fork() inherits its parent's ids.
 struct Processes {
   std::atomic<pid_t> of_threads{0}, of_cuda{0};
 };
 
-// Returns the record shared by all extensions of the package. The caller must hold the GIL.
+// Returns the ids, which all extension modules of the package share. The caller must hold the GIL.
 Processes& processes() {
   static Processes& shared = py::get_or_create_shared_data<Processes>("pictura: processes");
   return shared;
@@ -36,7 +36,7 @@ void check_process(std::string_view what, int num_threads, Device device) {
 }
 
 namespace {
-// Calls f with each C++ class of a module, and pybind11's type information.
+// Calls f for each C++ class of a module, with pybind11's type information.
 template <typename F>
 void for_each_class(const py::module_& module, F&& f) {
   for (const auto& [name, value] : py::dict(module.attr("__dict__").attr("copy")())) {

@@ -1,5 +1,5 @@
-// Calls of the library from Python: without the GIL, one thread at a time for each object, and never in a process
-// forked from one whose threads or CUDA context it would need.
+// Rules for calls of the library from Python. They run without the GIL. Only one thread at a time may call an object. A
+// child of fork() cannot make calls that need threads or CUDA if its parent has used them.
 #pragma once
 
 #include <atomic>
@@ -23,13 +23,13 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// Throws Error in a child of fork() if the parent had started threads or used CUDA, and this call needs them: the
-/// child has neither, and would wait for them indefinitely.
+/// Throws Error in a child of fork() if this call needs threads or CUDA and the parent has used them. The child has
+/// neither the parent's threads nor its CUDA context, and would wait for them forever.
 void check_process(std::string_view what, int num_threads, Device device);
 
-/// Scope without the GIL. If a thread wants the GIL back while the interpreter ends, Python before 3.14 ends the thread
-/// through an exception, which must not leave a destructor. The thread therefore waits for the end of the process, as
-/// in Python 3.14 and later.
+/// Scope without the GIL. If the interpreter is shutting down when the scope ends, Python before 3.14 throws an
+/// exception to end the thread. An exception must not leave a destructor, so the thread instead waits for the end of
+/// the process, as it does in Python 3.14 and later.
 class GilRelease {
  public:
   GilRelease() : state_(PyEval_SaveThread()) {}
@@ -47,19 +47,20 @@ class GilRelease {
   PyThreadState* state_;
 };
 
-/// Makes methods of a module's classes reject objects that were created by __new__ alone, which have no C++ object:
-/// pybind11 would pass uninitialised memory. Call at the end of a module's definition.
+/// Makes the methods of a module's classes reject Python objects without a C++ object, which result from __new__
+/// without __init__. Otherwise pybind11 would pass uninitialised memory to the methods. Call this at the end of a
+/// module's definition.
 void reject_uninitialized_objects(const py::module_& module);
 
-/// Makes objects of a module's classes use pickle protocol 2 if 0 or 1 is requested. The old protocols copy the part of
-/// an object that belongs to pybind11's own base class, which ends the process. Call at the end of a module's
-/// definition.
+/// Makes objects of a module's classes use pickle protocol 2 if protocol 0 or 1 is requested. With protocols 0 and 1,
+/// Python would copy the part of an object that belongs to pybind11's base class, which crashes the process. Call this
+/// at the end of a module's definition.
 void pickle_by_new_protocols(const py::module_& module);
 
-/// Guard that admits one thread at a time into calls of an object.
+/// Guard that allows only one thread at a time to call an object.
 class SingleCallGuard {
  public:
-  /// Scope of a call. Throws Error if another thread is in a call.
+  /// Scope of a call. The constructor throws Error if another thread is in a call.
   class Pass {
    public:
     Pass(SingleCallGuard* call_guard, std::string_view what) : call_guard_(call_guard) {
@@ -78,10 +79,10 @@ class SingleCallGuard {
   std::atomic<bool> is_taken_{false};
 };
 
-/// Calls of one library object, which serves one thread at a time.
+/// Runs calls of one library object, only one at a time.
 class Calls {
  public:
-  /// num_threads as in the library; 0: all.
+  /// num_threads: number of threads that the object uses; 0: all.
   Calls(int num_threads, Device device) : num_threads_(num_threads), device_(device) {}
 
   /// Runs `work` without the GIL. Throws Error if another thread is in a call of the same object.
@@ -93,7 +94,7 @@ class Calls {
     return std::forward<Work>(work)();
   }
 
-  /// Guard for other objects that call the same object.
+  /// Returns the guard, for other objects that call the same library object.
   const std::shared_ptr<SingleCallGuard>& call_guard() const { return call_guard_; }
 
  private:
@@ -102,9 +103,9 @@ class Calls {
   std::shared_ptr<SingleCallGuard> call_guard_ = std::make_shared<SingleCallGuard>();
 };
 
-/// Runs long work in a separate thread and returns its result. Meanwhile the caller's thread handles ^C by raising
-/// KeyboardInterrupt, and the work ends in the background without its result being used. The work must own everything
-/// that it reads.
+/// Runs long work in a separate thread and returns its result. On ^C, the call raises KeyboardInterrupt immediately;
+/// the work continues in the background, and its result is discarded. The work must therefore own all data that it
+/// reads.
 template <typename Work>
 auto run_interruptibly(std::string_view what, int num_threads, Device device, Work work) {
   using Result = decltype(work());
@@ -122,8 +123,9 @@ auto run_interruptibly(std::string_view what, int num_threads, Device device, Wo
   return result.get();
 }
 
-/// Runs long work, which checks interrupted() between its steps, in a separate thread. ^C ends the work in an orderly
-/// way, as it ends the command, and then raises KeyboardInterrupt. The work may call back into Python.
+/// Runs long work in a separate thread and returns its result. The work must check interrupted() regularly and return
+/// early if it is true. On ^C, the call waits for this return and then raises KeyboardInterrupt. The work may call
+/// Python functions.
 template <typename Work>
 auto run_interruptible(std::string_view what, int num_threads, Device device, Work work) {
   check_process(what, num_threads, device);

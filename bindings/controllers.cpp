@@ -1,4 +1,4 @@
-// Controllers in Python: controllers by name, shared controllers, and their commands.
+// pictura.Controller: controllers by name, shared controllers, and their commands.
 #include "pictura/backends/make_controller.h"
 #include "pictura/bindings/python_simulator.h"
 #include "pictura/simulator/controllers/shared_control.h"
@@ -7,7 +7,7 @@ namespace pictura::python {
 
 namespace {
 
-/// Controller that other objects hold as well.
+/// Controller that forwards to a controller with shared ownership.
 class HeldController final : public Controller {
  public:
   explicit HeldController(std::shared_ptr<Controller> held) : held_(std::move(held)) {}
@@ -20,7 +20,7 @@ class HeldController final : public Controller {
   std::shared_ptr<Controller> held_;
 };
 
-/// Creates a controller of several drivers that share a simulator's slots; a mask of None means all slots.
+/// Creates a controller that combines several controllers, each with a mask of its slots. None means all slots.
 ControllerInside shared_controller(const std::vector<std::pair<PyController*, py::object>>& drivers,
                                    const PySimulator& simulator) {
   std::vector<Driver> driving;

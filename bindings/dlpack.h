@@ -1,5 +1,5 @@
-// Binary interface of DLPack 1.0, as far as the bindings use it: tensors that one library lends to another. Structs of
-// the versioned and of the older form; names follow the standard.
+// The part of DLPack 1.0 that the bindings use. DLPack is a binary interface with which libraries share tensors. The
+// file contains the structs of the versioned and the older form; names follow the standard.
 #pragma once
 
 #include <cstdint>

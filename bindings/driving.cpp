@@ -1,5 +1,5 @@
-// Evaluation, probes and saved policies, in the extension with torch and in the one without. Their arguments and
-// results are objects of pictura._pictura.
+// Evaluation, probes and saved policies, for the extension modules with and without torch. Their arguments and results
+// are objects of the extension module pictura._pictura.
 #include "pictura/bindings/driving.h"
 
 #include <array>
@@ -36,7 +36,7 @@ namespace pictura::python {
 
 namespace {
 
-/// Adds each metric of an evaluation's row as (value, half of its 95 % interval).
+/// Adds each metric of an evaluation's row as (value, half width of its 95 % confidence interval).
 template <typename Row>
 void add_metrics(const Row& row, py::dict* row_out) {
   for (const auto& [name, estimate] : metrics_of(row)) {
@@ -44,7 +44,7 @@ void add_metrics(const Row& row, py::dict* row_out) {
   }
 }
 
-/// Counts and metrics of a row of evaluate().
+/// Adds counts and metrics of a row of evaluate() to a dict.
 void add_row(const EvaluateRow& row, py::dict* row_out) {
   py::dict& d = *row_out;
   d["scenarios"] = row.scenarios;
@@ -120,7 +120,7 @@ py::dict dict_of(const SceneEvaluation& evaluation, const std::vector<SceneAgent
   return d;
 }
 
-/// Options with which pictura.Simulator creates such a world.
+/// Returns the options of pictura.Simulator that give this configuration.
 py::dict dict_of(SimulatorConfig config) {
   py::dict d;
   for (const Parameter& parameter : parameters_of("", config)) d[parameter.name.c_str()] = parameter.value;
@@ -188,7 +188,7 @@ void visit_options(ProbeArguments<Probe>& arguments, Visitor&& v) {
   v.callback({"on_progress"}, worlds.on_progress);
 }
 
-/// Arguments for opening a policy.
+/// Arguments of PolicySession's constructor.
 struct PolicyArguments : DriverOptions {};
 
 template <typename Visitor>
@@ -198,7 +198,8 @@ void visit_options(PolicyArguments& arguments, Visitor&& v) {
   visit_light_options(arguments, v);
 }
 
-/// Throws UsageError if `replay` names no page, or if the requested case is not below `count`.
+/// Throws UsageError if `replay` has a case or cameras but no file, if the file is invalid, or if the case is not less
+/// than `count`.
 void check_case_replay(const CaseReplayOptions& replay, int64_t count) {
   const std::string& path = replay.path;
   if (path.empty() && (replay.number || replay.recording.cameras)) {
@@ -209,8 +210,8 @@ void check_case_replay(const CaseReplayOptions& replay, int64_t count) {
   check_case_number(replay, count);
 }
 
-/// Defines a probe, which writes the requested files and returns its summary. `most` is its maximum number of cases, if
-/// it is known in advance.
+/// Defines the Python function of a probe, which writes the requested files and returns a summary. `most` is the
+/// probe's maximum number of cases, if it is known in advance.
 template <typename Probe, typename Results, typename Row>
 void def_probe(py::module_* module, const char* name, Results (*ask)(const Probe&),
                void (*write_cases)(const std::string&, const Results&),
@@ -254,7 +255,7 @@ struct Outputs {
   }
 };
 
-/// Controller of a session, which holds session and renderer: both may be called from other threads.
+/// Controller of a session. It keeps session and renderer alive, and guards against calls of them by other threads.
 class SessionController final : public Controller {
  public:
   SessionController(std::shared_ptr<PolicySession> session, std::shared_ptr<SingleCallGuard> of_session,
@@ -610,7 +611,7 @@ make_renderer(), with the simulator's geometries. Raises pictura.Error if a geom
 }  // namespace
 
 void bind_driving(py::module_& module) {
-  // Types and exceptions are that extension's.
+  // This module uses types and exceptions of pictura._pictura.
   py::module_::import("pictura._pictura");
   bind_evaluation(module);
   bind_probes(module);

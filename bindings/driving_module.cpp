@@ -1,4 +1,4 @@
-// The extension module pictura._driving: saved policies and their evaluation on the CPU, without torch.
+// Extension module pictura._driving: saved policies and their evaluation on the CPU, without torch.
 #include "pictura/bindings/driving.h"
 
 PYBIND11_MODULE(_driving, module) {

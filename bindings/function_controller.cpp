@@ -79,7 +79,7 @@ class FunctionController final : public Controller {
   }
 
   static py::dict observations_of(const SimulatorArrays& input, int slots) {
-    // Copied, since the function may keep the arrays.
+    // Arrays are copied, because the function may keep them.
     py::dict observations;
     for (const NamedArray& named : observation_arrays(input.observations, slots, input.device)) {
       const Array& array = named.array;

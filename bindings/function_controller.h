@@ -1,4 +1,4 @@
-// Python function as a controller, which evaluations accept in place of a controller's name.
+// Controllers that call a Python function. Evaluations accept such a function instead of a controller's name.
 #pragma once
 
 #include <functional>
@@ -15,14 +15,14 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// Returns "function NAME" of a function or of an object's class.
+/// Returns "function NAME" for a function. For another callable object, NAME is the name of its class.
 std::string name_of_function(const py::function& function);
 
-/// Makes controllers that call function(observations), NumPy's arrays [slots, ...] by name, for actions int [slots].
-/// With a renderer, observations have images as well: `rgb` u8 [slots, cameras, 3, height, width], black for inactive
-/// agents; `rgb_0`, `rgb_1`, ... if the cameras have several sizes. The controllers throw Error if the simulator or the
-/// renderer is not on the host, UsageError if the function returns anything else, and exceptions that the function
-/// raises.
+/// Returns a function that makes controllers. These call function(observations), which must return actions, int
+/// [slots]; `observations` is a dict of NumPy arrays [slots, ...]. With a renderer, observations also contain images:
+/// `rgb`, u8 [slots, cameras, 3, height, width], black for inactive agents; `rgb_0`, `rgb_1`, ... if the cameras have
+/// several sizes. The controllers throw Error if the simulator or the renderer does not work in host memory, UsageError
+/// if the function returns anything except actions, and the exceptions that the function raises.
 std::function<std::unique_ptr<Controller>(const Simulator&, Renderer*)> function_controllers(
     const py::function& function);
 

@@ -1,4 +1,4 @@
-// Maps in Python.
+// pictura.Map.
 #include <algorithm>
 #include <tuple>
 
@@ -81,7 +81,7 @@ py::dict arrays_of(const RoadMap& map) {
   return d;
 }
 
-/// Returns (kind, action, message) for each repaired fault.
+/// Returns (kind, action, message) for each fault that was repaired in the map's file.
 std::vector<std::tuple<std::string, std::string, std::string>> repairs_of(const Map& map) {
   std::vector<std::tuple<std::string, std::string, std::string>> repairs;
   for (const Repair& repair : map.road()->mends) {

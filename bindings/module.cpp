@@ -1,4 +1,4 @@
-// Extension module pictura._pictura: the library without torch.
+// Extension module pictura._pictura: the parts of the library that need no torch.
 #include <pybind11/pybind11.h>
 
 #include "pictura/bindings/call.h"
@@ -12,7 +12,7 @@ PYBIND11_MODULE(_pictura, module) {
   namespace py = pybind11;
   module.doc() =
       "The pictura library: maps, scenes, renderers and simulators. Import `pictura`, which has these names.";
-  // Never destroyed, since statics end after the interpreter.
+  // The exceptions are never destroyed, because static objects outlive the interpreter.
   static const py::handle error = py::exception<pictura::Error>(module, "Error", PyExc_RuntimeError).release();
   static const py::handle usage_error =
       py::exception<pictura::UsageError>(module, "UsageError", py::make_tuple(error, py::handle(PyExc_ValueError)))

@@ -1,4 +1,4 @@
-// Names and layouts of arrays, fields, events and structs, as attributes of the module.
+// Constants of the module: names and layouts of arrays, fields, events and structs.
 #include "pictura/bindings/python_simulator.h"
 
 namespace pictura::python {
@@ -30,7 +30,7 @@ void bind_names(py::module_& module) {
   for (const char* name : {"kind", "action"}) command.append(py::make_tuple(name, "<i4"));
   for (const char* name : {"x_m", "y_m", "z_m", "heading_rad", "speed_mps"})
     command.append(py::make_tuple(name, "<f4"));
-  // Members in NumPy's format.
+  // `members` are in the format of NumPy's dtype().
   const auto dtype_of = [](const py::list& members, size_t size, const char* what) {
     const py::object type = py::module_::import("numpy").attr("dtype")(members);
     PICTURA_CHECK(py::cast<size_t>(type.attr("itemsize")) == size, "{}'s layout", what);

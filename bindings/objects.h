@@ -1,5 +1,5 @@
-// Objects shared by the parts of the bindings: maps, geometries, scenes, renderers' images and simulators in Python,
-// and the objects exchanged with the separate extension that uses torch.
+// C++ objects behind Python classes, which several files of the bindings use: maps, geometries, scenes, and the
+// contents of simulators, renderers and controllers, which the extension modules exchange.
 #pragma once
 
 #include <functional>
@@ -20,19 +20,20 @@
 
 namespace pictura::python {
 
-/// Road map, with its compiled versions.
+/// Road map (pictura.Map) with its compiled versions.
 class Map {
  public:
-  /// Wraps a map; `source` names its file in messages.
+  /// Wraps a map. Messages contain `source`, the name of its file.
   Map(std::shared_ptr<const RoadMap> road, std::string source) : road_(std::move(road)), source_(std::move(source)) {}
   virtual ~Map() = default;
   const std::shared_ptr<const RoadMap>& road() const { return road_; }
   const std::string& source() const { return source_; }
-  /// Returns the map compiled with these options, compiling it in the first call. The caller must hold the GIL.
+  /// Returns the map compiled with these options. The first call for each set of options compiles it. The caller must
+  /// hold the GIL.
   std::shared_ptr<const CompiledMap> compiled(const MapOptions& options);
 
  protected:
-  /// Returns a function that compiles the map, and that owns everything that it reads.
+  /// Returns a function that compiles the map. The function owns all data that it reads.
   virtual std::function<std::shared_ptr<const CompiledMap>()> compilation(const MapOptions& options) const;
 
  private:
@@ -41,7 +42,7 @@ class Map {
   std::vector<std::shared_ptr<const CompiledMap>> compiled_;
 };
 
-/// Recorded scene from one of its steps on: the map of worlds whose agents are its tracks.
+/// Recorded scene from a start step on, as a map. The agents of worlds on this map are the scene's tracks.
 class RecordedScene final : public Map {
  public:
   /// Throws UsageError for a step that the scene does not have.
@@ -64,36 +65,36 @@ struct Geometry {
   std::shared_ptr<const StaticGeometry> geometry;
 };
 
-/// Moving objects: arrays of a caller, or a simulator's scene at each call.
+/// Moving objects to draw: arrays of a caller, or the current scene of a simulator.
 struct Scene {
   std::shared_ptr<const void> owner;
   std::function<SceneBatch()> batch;
   Stream stream;
 };
 
-/// Contents of a pictura.Simulator.
+/// C++ contents of a pictura.Simulator.
 struct SimulatorInside {
   std::shared_ptr<Simulator> simulator;
-  /// Runs work without the GIL while no other thread is in a call of the simulator.
+  /// Runs `work` without the GIL, as one call of the simulator (see Calls::run()).
   std::function<void(std::string_view what, const std::function<void()>& work)> run;
-  /// Adds an observer of steps for as long as the observer lives.
+  /// Adds an observer of steps. It is removed when the observer is destroyed.
   std::function<void(const std::shared_ptr<StepObserver>&)> watch;
 };
 
-/// Contents of a pictura.Renderer.
+/// C++ contents of a pictura.Renderer.
 struct RendererInside {
   std::shared_ptr<Renderer> renderer;
   std::shared_ptr<SingleCallGuard> call_guard;
 };
 
-/// Contents of a pictura.Controller.
+/// C++ contents of a pictura.Controller.
 struct ControllerInside {
   std::shared_ptr<Simulator> of;
   std::shared_ptr<Controller> controller;
 };
 
-/// Returns the contents of a pictura.Simulator or a pictura.Renderer, as `expected` names it. Throws UsageError for
-/// other objects; `what` begins its message.
+/// Returns the C++ contents of a Python object. Throws UsageError if it is not a pictura.EXPECTED, where EXPECTED is
+/// the value of `expected`, such as "Simulator". The message begins with `what`.
 template <typename Inside>
 Inside inside_of(const py::handle& object, std::string_view what, std::string_view expected) {
   const py::object inside = py::hasattr(object, "_inside") ? py::object(object.attr("_inside")()) : py::none();
@@ -103,17 +104,18 @@ Inside inside_of(const py::handle& object, std::string_view what, std::string_vi
   return py::cast<Inside>(inside);
 }
 
-/// Throws Error if a device was requested and the CPU was chosen; `choice` gives the reason.
+/// Throws Error if a device was requested but the CPU was chosen. The message contains `choice`, the reason.
 void check_device(std::string_view what, Device wanted, Device given, std::string_view choice);
 
-/// Converts a Python stream handle, an int; None: CUDA's legacy default stream. Throws UsageError for other values.
+/// Converts a stream handle of Python: an int, or None for CUDA's legacy default stream. Throws UsageError for other
+/// values.
 Stream stream_of(const py::object& handle);
 
-/// Facts of a map, by name.
+/// Converts facts of a map to a dict.
 py::dict facts_of(const MapFacts& facts);
 
-/// Draws a map from above, uint8 [height, width, 3]; for a scenario on that map also its tracks, and their boxes at a
-/// step. The caller must hold the GIL.
+/// Draws a map from above and returns the image, uint8 [height, width, 3]. For a scenario on this map, also draws its
+/// tracks and, unless `step` is -1, their boxes at that step. The caller must hold the GIL.
 py::array_t<uint8_t> draw(const RoadMap& map, int width_px, int height_px, const Scenario* scenario = nullptr,
                           int step = -1);
 

@@ -1,4 +1,5 @@
-// Python functions whose arguments are the options of a struct, as listed once by visit_options(options, visitor).
+// Python functions whose arguments are the options of a struct. The C++ function visit_options(options, visitor) lists
+// these options.
 #pragma once
 
 #include <array>
@@ -25,25 +26,25 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// Returns the device of "cpu", "cuda" or "cuda:1". Throws UsageError for other names.
+/// Returns the device with a name such as "cpu", "cuda" or "cuda:1". Throws UsageError for other names.
 Device device_of(const std::string& name);
 
 using ConditioningRanges = std::array<ConditioningRange, kNumConditioning>;
 
-/// Option of a struct as an argument of a function.
+/// Option of a struct as a parameter of a Python function.
 struct Parameter {
   std::string name;
   py::object value;      // current value
-  py::cpp_function set;  // set(value) converts a value and writes it into the struct
+  py::cpp_function set;  // set(value) converts a Python value and writes it to the struct
 };
 
-/// Visitor of option lists that collects options as parameters. The options must outlive the parameters.
+/// Visitor for visit_options() that collects the options as parameters. The visited struct must outlive the parameters.
 class ParameterVisitor {
  public:
-  /// `function` is the function's name in messages.
+  /// `function` is the name of the Python function, for messages.
   explicit ParameterVisitor(std::string function) : function_(std::move(function)) {}
 
-  /// Adds a number; the simulator checks its range.
+  /// Adds a number. Its range is not checked here, but by the code that uses it.
   template <typename T, typename... Range>
   void value(const NamedOption& option, T& value, Range...) {
     add<T>(option, value, [&value](const T& given) { value = given; });
@@ -54,7 +55,7 @@ class ParameterVisitor {
     add<std::string>(option, names[static_cast<int>(value)],
                      [=, &value](const std::string& given) { value = chosen<Enum>(option, given, names); });
   }
-  /// Adds a choice; the empty name means no value.
+  /// Adds a choice. An empty name means nullopt.
   template <typename Enum>
   void choice(const NamedOption& option, std::optional<Enum>& value, Span<const char* const> names) {
     add<std::string>(option, value ? names[static_cast<int>(*value)] : "", [=, &value](const std::string& given) {
@@ -71,13 +72,13 @@ class ParameterVisitor {
     });
   }
   void device(const NamedOption& option, Device& value);
-  /// Adds names of maps, with ranges of seeds expanded.
+  /// Adds names of maps. A range of seeds in a name is expanded to several names.
   void maps(const NamedOption& option, std::vector<std::string>& names);
-  /// Adds numbers or (low, high) by name, which replace the present ones.
+  /// Adds a dict from names of coefficients to numbers or (low, high). It replaces the ranges of these coefficients.
   void conditioning(const NamedOption& option, ConditioningRanges& ranges);
-  /// Adds numbers by name, as "name=value".
+  /// Adds a dict from names to numbers, which is stored as texts "name=value".
   void numbers_by_name(const NamedOption& option, std::vector<std::string>& texts);
-  /// Adds a controller's name, or a Python function that drives.
+  /// Adds the name of a controller, or a Python function that chooses actions.
   template <typename Options>
   void controller(const NamedOption& option, Options& options) {
     using Given = std::variant<std::string, py::function>;
@@ -96,7 +97,7 @@ class ParameterVisitor {
   void callback(const NamedOption& option, std::function<void(Arguments...)>& value) {
     add<py::object>(option, py::none(), [&value](const py::object& given) {
       if (given.is_none()) return;
-      // Shared, since options are copied without the GIL.
+      // The Python object is shared, because options are copied without the GIL.
       value = [function = std::make_shared<const py::object>(given)](Arguments... arguments) {
         const py::gil_scoped_acquire gil;
         (*function)(arguments...);
@@ -123,7 +124,7 @@ class ParameterVisitor {
   std::vector<Parameter> parameters_;
 };
 
-/// Signature as pybind11 writes it: "(steps: int = 3) -> str".
+/// Returns a function's signature as pybind11 writes it: "(steps: int = 3) -> str".
 std::string signature_of(const py::cpp_function& function);
 
 template <typename Options>
@@ -133,19 +134,21 @@ std::vector<Parameter> parameters_of(const std::string& function, Options& optio
   return visitor.parameters();
 }
 
-/// Function of options: the arguments `required` are given by position or by name, all others by name.
+/// Python function whose parameters are the options of a struct. Callers pass the options `required` by position or by
+/// name, and all others by name.
 struct OptionsFunction {
   std::string name;
   std::vector<std::string> required;
 
-  /// Text of help(): a signature as pybind11 writes it, "(config: str, *, minutes: float = 0.0) -> dict", and `doc`.
-  /// `first` are parameters before the options.
+  /// Returns the text for Python's help(): a signature in the style of pybind11, such as "(config: str, *, minutes:
+  /// float = 0.0) -> dict", and `doc`. `first` are the parameters before the options.
   template <typename Options>
   std::string help(const std::string& first, const std::string& result, const std::string& doc) const {
     Options defaults;
     return signature(parameters_of(name, defaults), first, result) + "\n\n" + doc;
   }
-  /// Returns the callable for Python of function(Options&), which throws TypeError for arguments that do not fit.
+  /// Returns the callable for Python: it converts its arguments to Options and calls function(options). It throws
+  /// TypeError for arguments that do not fit.
   template <typename Options, typename Function>
   auto caller(const Function& function) const {
     return [*this, function](const py::args& by_place, const py::kwargs& by_name) {
@@ -160,7 +163,7 @@ struct OptionsFunction {
   void read(const py::args& by_place, const py::dict& by_name, const std::vector<Parameter>& parameters) const;
 };
 
-/// Defines a function of a module.
+/// Defines a function of a module whose parameters are the options of Options.
 template <typename Options, typename Function>
 void def_with_options(py::module_* module, const OptionsFunction& arguments, const Function& function,
                       const std::string& doc) {
@@ -171,7 +174,8 @@ void def_with_options(py::module_* module, const OptionsFunction& arguments, con
   module->def(arguments.name.c_str(), arguments.caller<Options>(function), help.c_str());
 }
 
-/// Defines the constructor of the class that has the function's name.
+/// Defines the constructor of a class whose parameters are the options of Options. arguments.name is the name of the
+/// class.
 template <typename Options, typename Class, typename Function>
 void def_init_with_options(Class* its_class, const OptionsFunction& arguments, const Function& make,
                            const std::string& doc) {

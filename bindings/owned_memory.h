@@ -1,4 +1,4 @@
-// Memory owned by the extension, on the host or on a device, which is lent to Python arrays.
+// Memory of an extension module, on the host or on a device, for arrays that Python can access.
 #pragma once
 
 #include <vector>
@@ -14,8 +14,8 @@ namespace pictura::python {
 
 class OwnedMemory {
  public:
-  /// Allocates memory and returns its first byte; previous contents are lost. `what` begins the message of a build
-  /// without CUDA.
+  /// Allocates memory and returns its first byte. Previous contents are lost. In builds without CUDA, throws Error for
+  /// a device; the message begins with `what`.
   uint8_t* allocate(size_t num_bytes, Device device, [[maybe_unused]] const char* what) {
     if (device.is_host()) {
       on_host_.resize(num_bytes);

@@ -1,4 +1,5 @@
-// Simulators and controllers in Python, with the arrays that they borrow and lend.
+// C++ classes behind pictura.Simulator and pictura.Controller. They accept arrays of Python (borrow) and give Python
+// access to their own arrays (lend) without copies.
 #pragma once
 
 #include <algorithm>
@@ -25,12 +26,12 @@
 
 namespace pictura::python {
 
-/// Results of a step, as arrays that the next step overwrites.
+/// Results of a step as Python arrays, which the next step overwrites.
 struct StepArraysOfPython {
   py::object reward, terminated, truncated, valid, refusal, reward_terms, distance_m;
 };
 
-/// State kept by a simulator.
+/// Snapshot of a simulator's state (see Simulator::snapshot()).
 struct Snapshot {
   std::shared_ptr<Simulator> of;
   std::unique_ptr<StateSnapshot> state;
@@ -38,7 +39,7 @@ struct Snapshot {
 
 class PyController;
 
-/// Simulator, its maps, and the arrays that its calls lend and keep.
+/// Simulator with its maps, the arrays that it lends, and the callers' arrays that it keeps alive.
 class PySimulator {
  public:
   PySimulator(const std::string& executor, const SimulatorConfig& config, const std::vector<std::shared_ptr<Map>>& maps,
@@ -60,8 +61,8 @@ class PySimulator {
   const std::string& choice() const { return choice_; }
   const std::vector<std::shared_ptr<Map>>& maps() const { return maps_; }
 
-  /// Replaces the worlds. If the memory suffices, nothing moves; otherwise existing arrays keep the previous
-  /// simulator's memory.
+  /// Replaces the worlds. If the capacity suffices, arrays stay at their addresses. Otherwise a new simulator replaces
+  /// the old one, and Python's existing arrays keep the old one's memory alive.
   void set_worlds(const std::vector<std::shared_ptr<Map>>& maps, std::vector<WorldSpec> worlds, uint64_t seed) {
     CompiledMaps next = compiled(maps);
     const SimulatorCapacity needs = capacity_checked(next, worlds);
@@ -76,7 +77,7 @@ class PySimulator {
       config_ = config;
     }
     maps_ = maps;
-    watchers_.clear();  // they observed the previous worlds
+    watchers_.clear();  // they observe only the previous worlds
     forget_arrays();
   }
 
@@ -244,10 +245,10 @@ class PySimulator {
     return pixels;
   }
 
-  /// Steps with the commands of a controller.
+  /// Takes steps with the commands of a controller.
   void run(PyController& controller, int64_t steps);
 
-  /// Runs steps in calls of 50 ms. Between these calls ^C is handled, and another thread may call.
+  /// Takes steps in calls of about 50 ms. Between these calls, ^C is handled and other threads may call the simulator.
   template <typename Work>
   void run_steps(int64_t steps, const Work& step) {
     using Clock = std::chrono::steady_clock;
@@ -263,12 +264,12 @@ class PySimulator {
   }
 
  private:
-  /// Shape of an observation array; arrays that are not sets have one row.
+  /// Returns the shape of an observation array. Arrays with one row get no dimension for rows.
   static Dims shape_of(int64_t count, int64_t rows, int64_t features) {
     return rows == 1 ? Dims{count, features} : Dims{count, rows, features};
   }
 
-  /// Memory for the answers to a number of queries, on a device.
+  /// Memory for the answers to observe(), on the host or a device.
   class AnswerMemory {
    public:
     AnswerMemory(int64_t count, const SimulatorConfig& config, Device device) {
@@ -313,7 +314,8 @@ class PySimulator {
     return {reinterpret_cast<const T*>(bytes.data()), static_cast<size_t>(count)};
   }
 
-  /// Views of the caller's arrays by name, one for every array that this simulator observes.
+  /// Returns access to the caller's arrays. The dict must contain each array that this simulator observes, and no
+  /// others.
   ObservationView view_of(const py::dict& arrays, int64_t count, std::vector<BorrowedArray>* borrowed) {
     ObservationView view;
     size_t num_known = 0;
@@ -351,7 +353,7 @@ class PySimulator {
     for (const int32_t action : indices) commands.push_back({.action = action});
     return watched_step(std::move(commands));
   }
-  /// Steps while observers watch; ^C ends the wait for them.
+  /// Takes a step with observers: first waits until they are ready (^C ends this wait), and notifies them of the step.
   StepResult watched_step(std::vector<Command> commands) {
     const std::vector<std::shared_ptr<StepObserver>> watching = watchers();
     for (const auto& watcher : watching) {
@@ -396,8 +398,8 @@ class PySimulator {
     result_ = {};
     of_result_ = nullptr;
   }
-  /// Keeps arrays, since work on a device may still read them. The previous arrays are released last: this may call
-  /// Python, which may call this object.
+  /// Keeps the arrays of the last call alive, because work on a device may still read them. Releasing the previous
+  /// arrays may call Python code, which may call this object, so it happens last.
   void keep(std::vector<BorrowedArray> arrays) { kept_.swap(arrays); }
   void keep(BorrowedArray array) {
     std::vector<BorrowedArray> arrays;
@@ -466,7 +468,7 @@ class PySimulator {
   std::unique_ptr<WorldPainter> painter_;
 };
 
-/// Controller, its simulator, and the commands that it writes, in the simulator's memory.
+/// Controller with its simulator and the memory for its commands, on the simulator's device.
 class PyController {
  public:
   explicit PyController(ControllerInside inside)
@@ -489,7 +491,7 @@ class PyController {
 
   std::string name() const { return std::string(inside_.controller->name()); }
   const ControllerInside& inside() const { return inside_; }
-  /// Computes the commands; called without the GIL.
+  /// Computes the commands. Must be called without the GIL.
   void act(const PySimulator& simulator) {
     const bool has_same_worlds = std::ranges::equal(of().maps(), maps_) && std::ranges::equal(of().worlds(), worlds_);
     PICTURA_CHECK(simulator.shared() == inside_.of && has_same_worlds,
@@ -497,7 +499,8 @@ class PyController {
     inside_.controller->act(of().arrays(), {}, commands_->span, simulator.stream());
   }
   Span<const Command> commands() const { return commands_->span; }
-  /// Returns the commands as a NumPy array of COMMAND_DTYPE, or as u8 [slots, bytes of a command] on a device.
+  /// Returns the commands: on the host a NumPy array of COMMAND_DTYPE, on a device an array u8 [slots,
+  /// sizeof(Command)].
   py::object lent_commands(Stream stream) const {
     const auto count = static_cast<int64_t>(commands_->span.size());
     auto* const bytes = reinterpret_cast<uint8_t*>(commands_->span.data());
@@ -525,10 +528,10 @@ class PyController {
   std::shared_ptr<Commands> commands_;
 };
 
-/// Defines the methods of pictura.Controller.
+/// Adds the methods of pictura.Controller to the class.
 void define_controller(py::class_<PyController>* controller);
 
-/// Adds the names and layouts of arrays, fields, events and structs to the module.
+/// Adds constants to the module: names and layouts of arrays, fields, events and structs.
 void bind_names(py::module_& module);
 
 }  // namespace pictura::python

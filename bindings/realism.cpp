@@ -1,4 +1,4 @@
-// Realism scores in Python: what pictura/realism.py wraps.
+// Realism scores of simulated traffic, which pictura/realism.py wraps.
 #include "pictura/evaluation/realism.h"
 
 #include <pybind11/numpy.h>
@@ -39,7 +39,7 @@ SceneRollouts rollouts_of(const Ids& track_ids, const Doubles& center_m, const D
   return scene;
 }
 
-/// [rollouts, road users, steps] by name, of the features of rollouts.
+/// Returns the features of rollouts as a dict of arrays [rollouts, road users, steps].
 py::dict arrays_of(const std::vector<RealismFeatures>& rollouts) {
   const size_t objects = rollouts.empty() ? 0 : rollouts[0].num_objects();
   const size_t steps = rollouts.empty() ? 0 : rollouts[0].num_steps();

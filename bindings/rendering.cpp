@@ -106,7 +106,7 @@ ElementType element_of(PixelFormat format) {
   }
 }
 
-/// Images, and planes if requested, in one block of a device's memory.
+/// Images, with depth, class and instance planes if requested, in one block of memory.
 class Images {
  public:
   Images(const Rig& rig, int64_t num_views, PixelFormat format, bool planes, Device device, Stream stream)
@@ -116,7 +116,7 @@ class Images {
       plane_pixels += static_cast<size_t>(num_views * camera.size.pixels());
     }
     if (!planes) plane_pixels = 0;
-    // Largest elements first, so that all are aligned.
+    // Arrays with larger elements come first, so that all arrays are aligned.
     const size_t depth_bytes = plane_pixels * sizeof(float), instance_bytes = plane_pixels * sizeof(uint16_t);
     const size_t color_bytes = (layout_.bytes() + 7) / 8 * 8;
     uint8_t* at = memory_.allocate(color_bytes + depth_bytes + instance_bytes + plane_pixels, device_, "images");
@@ -181,7 +181,7 @@ class Images {
   std::vector<CameraImages> cameras_;
 };
 
-/// Memory of the views from `first` on.
+/// Returns the memory for the views from `first` on.
 std::vector<CameraImages> images_from(const ImageBatch& batch, int64_t first) {
   std::vector<CameraImages> cameras(batch.cameras.begin(), batch.cameras.end());
   for (CameraImages& camera : cameras) {
@@ -195,7 +195,7 @@ std::vector<CameraImages> images_from(const ImageBatch& batch, int64_t first) {
   return cameras;
 }
 
-/// Renderer with the stream of its work.
+/// pictura.Renderer: a renderer with the stream of its work.
 class PyRenderer {
  public:
   PyRenderer(const std::string& name, const RendererConfig& config, Stream stream)
@@ -250,10 +250,11 @@ class PyRenderer {
     PICTURA_CHECK(reinterpret_cast<uintptr_t>(bytes.data()) % alignof(View) == 0, "views: expected aligned memory");
     return {reinterpret_cast<const View*>(bytes.data()), static_cast<size_t>(array.shape[0])};
   }
-  /// Draws views; on the host in batches, between which ^C is handled. Images of a view do not depend on other views.
+  /// Draws views. On the host, draws them in batches and handles ^C between batches, because the images of a view do
+  /// not depend on other views.
   void draw(const Scene& scene, Span<const View> views, const ImageBatch& batch) {
-    // The set-up of an image costs about as much as kPixelsOfSetup pixels; kPixelsAtATime are about a tenth of a second
-    // on one core.
+    // Preparing an image takes about as long as drawing kPixelsOfSetup pixels. Drawing kPixelsAtATime pixels takes
+    // about 0.1 s on one core.
     constexpr int64_t kPixelsOfSetup = 4096, kPixelsAtATime = int64_t{1} << 22;
     int64_t pixels_per_view = 0;
     for (const Camera& camera : renderer_->config().rig.cameras) {
@@ -284,7 +285,8 @@ class PyRenderer {
     }
   }
 
-  /// Draws into the caller's images, into an array of the caller, which is then borrowed, or into new images.
+  /// Draws to `out`, which is a pictura.Images or another array of the caller, or to new images if it is None.
+  /// *borrowed_out gets the access to a caller's array.
   py::object draw_into(const Scene& scene, Span<const View> span, const py::object& out, const std::string& dtype,
                        bool planes, BorrowedArray* borrowed_out) {
     if (py::isinstance<Images>(out)) {
@@ -298,7 +300,7 @@ class PyRenderer {
       draw(scene, span, images->batch());
       return py::cast(images);
     }
-    // Array of the caller for a rig with one image size.
+    // `out` is another array of the caller, which requires cameras of one image size.
     *borrowed_out = borrow(out, "render: out", stream_);
     const Array& array = borrowed_out->array();
     const PixelFormat format = array.type == ElementType::f32    ? PixelFormat::f32
@@ -341,7 +343,7 @@ class PyRenderer {
   std::shared_ptr<Renderer> renderer_;
   Calls calls_;
   Stream stream_;
-  // Arrays of the last call on a device, whose work may still read and write them.
+  // Arrays of the last call. Work on a device may still read and write them.
   BorrowedArray kept_views_, kept_out_;
 };
 

@@ -1,4 +1,4 @@
-// Views of a simulator: recordings of a world as replays, and live views in a browser.
+// Recordings of a world as replays, and live views of a world in a browser.
 #include <optional>
 
 #include <fmt/format.h>
@@ -25,7 +25,7 @@ RendererConfig cameras_of(const std::optional<Rig>& rig) {
   return config;
 }
 
-/// Origin with this process's Python command line.
+/// Returns the origin of a replay, with the command line of this Python process.
 ReplayOrigin origin_of(const std::string& policy) {
   ReplayOrigin origin{.commit = PICTURA_COMMIT, .version = PICTURA_VERSION, .policy = policy, .policy_hash = policy};
   for (const py::handle word : py::module_::import("sys").attr("argv")) {
@@ -34,7 +34,7 @@ ReplayOrigin origin_of(const std::string& policy) {
   return origin;
 }
 
-/// Converts the followed agent's response for the next step: float32 [actions] logits and a value.
+/// Converts the logits, float32 [actions], and the value of the followed agent for the next step.
 ReplayDecision decision_of_python(const py::array_t<float, py::array::c_style | py::array::forcecast>& logits,
                                   float value) {
   PICTURA_CHECK(logits.ndim() == 1 && logits.size() == kNumActions,

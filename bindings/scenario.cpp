@@ -1,4 +1,4 @@
-// Recorded scenes in Python.
+// pictura.Scenario and worlds from recorded scenes.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -55,7 +55,7 @@ struct SceneNumbers {
 
 std::shared_ptr<RecordedScene> scene_of_arrays(const SceneArrays& arrays, const SceneNumbers& numbers,
                                                const std::string& id) {
-  constexpr int32_t kHistorySteps = 10;  // default of files that do not define it
+  constexpr int32_t kHistorySteps = 10;  // default for files that do not define it
   LoggedScene scene = scene_from_arrays(arrays);
   scene.id = scene.name = id;
   scene.dt_s = numbers.dt_s;
@@ -80,7 +80,7 @@ std::shared_ptr<RecordedScene> scene_of_arrays(const SceneArrays& arrays, const 
   return std::make_shared<RecordedScene>(std::move(scenario), id, 0);
 }
 
-/// Arguments of from_arrays() for a scenario.
+/// Returns the arguments of from_arrays() that give this scenario.
 py::dict arrays_of_scene(const Scenario& scenario) {
   py::dict d = to_arrays(scene_of_scenario(scenario));
   d["dt_s"] = scenario.dt_s;
@@ -108,7 +108,7 @@ py::dict facts_of_scene(const Scenario& scenario) {
   return d;
 }
 
-/// Copies numbers that are contiguous in every item.
+/// Copies `count` numbers, which are contiguous in each item from member `first` on, to an array.
 template <typename T, typename Item>
 py::array_t<T> copied(const std::vector<py::ssize_t>& shape, const std::vector<Item>& items, const T Item::* first,
                       size_t count) {
@@ -153,7 +153,7 @@ py::array_t<uint8_t> mask_of(const std::vector<uint8_t>& mask) {
   return py::array_t<uint8_t>(static_cast<py::ssize_t>(mask.size()), mask.data());
 }
 
-/// Options of a pictura.Simulator: `options`, with the settings of scene_config() in place of theirs.
+/// Returns options of pictura.Simulator: `options`, in which the settings of scene_config() replace others.
 py::dict world_of(const RecordedScene& scene, const py::kwargs& options) {
   const SimulatorConfig config = scene_config(*scene.scenario(), scene.start_step());
   py::dict d(options);

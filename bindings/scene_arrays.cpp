@@ -51,7 +51,7 @@ std::string text_of(const Shape& shape) {
   return "[" + text + "]";
 }
 
-/// Reader of one dict's arrays by name.
+/// Reads the arrays of a dict by name.
 class ArrayReader {
  public:
   ArrayReader(std::string name, py::dict arrays, const std::vector<std::string>& known)
@@ -68,7 +68,7 @@ class ArrayReader {
   std::string place(const char* key) const { return fmt::format("{}['{}']", name_, key); }
   std::string place(const char* key, py::ssize_t index) const { return fmt::format("{}[{}]", place(key), index); }
 
-  /// Reads finite numbers in [least, largest]; rows whose `where` is 0 may hold anything.
+  /// Reads finite numbers in [minimum, largest]. Rows whose element of `where` is 0 may contain any values.
   Numbers<double> numbers(const char* key, const Shape& shape, double minimum = -1e9, double largest = 1e9,
                           const uint8_t* where = nullptr) const {
     const Numbers<double> array = read<double>(key, shape, "biuf", "numbers");
@@ -87,7 +87,7 @@ class ArrayReader {
     return read<int64_t>(key, shape, "iu", "integers");
   }
 
-  /// Reads indices of names, of which pictura.NAMES lists `count`.
+  /// Reads indices in the list pictura.NAMES, where NAMES is the value of `names`. The list has `count` elements.
   Numbers<int64_t> codes(const char* key, const Shape& shape, int64_t count, const char* names) const {
     const Numbers<int64_t> array = integers(key, shape);
     for (py::ssize_t i = 0; i < array.size(); ++i) {
@@ -109,7 +109,8 @@ class ArrayReader {
     return flags;
   }
 
-  /// Reads the offset of each item's elements among `total`, and the end of the last item's.
+  /// Reads offsets of items in a list of `total` elements: where the elements of each item begin, and the end of the
+  /// last item.
   Numbers<int64_t> begins(const char* key, py::ssize_t items, py::ssize_t total) const {
     const Numbers<int64_t> array = integers(key, {items == kAnyLength ? kAnyLength : items + 1});
     if (array.size() == 0) fail_usage("{}: expected at least [0], got an empty array", place(key));
@@ -137,7 +138,8 @@ class ArrayReader {
     return lines;
   }
 
-  /// Reads lists of lanes by id, one after the other: KEY, and KEY_begin.
+  /// Reads lists of lane ids from two arrays: KEY contains all ids, one list after the other, and KEY_begin the offsets
+  /// of lists.
   std::vector<std::vector<int64_t>> lane_lists(const char* key, py::ssize_t items,
                                                const std::set<int64_t>& lanes) const {
     const Numbers<int64_t> ids = integers(key, {kAnyLength});
@@ -175,7 +177,7 @@ class ArrayReader {
     const bool fits = std::equal(shape.begin(), shape.end(), got.begin(), got.end(),
                                  [](auto wanted, auto length) { return wanted == kAnyLength || wanted == length; });
     if (!fits) fail_usage("{}: expected shape {}, got {}", place(key), text_of(shape), text_of(got));
-    // NumPy makes an empty list an array of floats.
+    // An empty array may have any type, because NumPy converts an empty list to an array of floats.
     if (given.size() > 0 && kinds.find(given.dtype().kind()) == std::string_view::npos) {
       fail_usage("{}: expected {}, got {}", place(key), expected, py::cast<std::string>(py::str(given.dtype())));
     }
@@ -224,7 +226,7 @@ void read_tracks(const py::dict& given, LoggedScene* scene) {
   }
 }
 
-/// Reads the lanes. Returns their ids.
+/// Reads the lanes and returns their ids.
 std::set<int64_t> read_lanes(const py::dict& given, LoggedScene* scene) {
   const ArrayReader arrays("lanes", given,
                            {"id", "type", "points", "begin", "speed_limit_mps", "width_m", "in_junction", "entries",
@@ -343,7 +345,7 @@ void read_lights(const py::dict& given, const std::set<int64_t>& lanes, LoggedSc
   }
 }
 
-/// Creates an array from its elements, one after the other.
+/// Creates an array from its elements in row-major order.
 template <typename T>
 py::array array_of(const Shape& shape, const std::vector<T>& values) {
   return py::array_t<T>(shape, values.data());

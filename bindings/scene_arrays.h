@@ -1,4 +1,4 @@
-// Scenes as dicts of NumPy arrays: arguments of pictura.Scenario.from_arrays() and results of to_arrays().
+// Conversion of scenes to and from dicts of NumPy arrays, for pictura.Scenario.from_arrays() and to_arrays().
 #pragma once
 
 #include <optional>
@@ -12,17 +12,17 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// Dicts of from_arrays(); those without a value are absent.
+/// Arguments of from_arrays(). Optional dicts may be missing.
 struct SceneArrays {
   py::dict tracks, lanes;
   std::optional<py::dict> lines, edges, crosswalks, stop_signs, lights;
 };
 
-/// Returns the scene of these arrays: its tracks, its map and its lights. Throws UsageError naming the array, and the
-/// element if there is one, the expected and the actual value.
+/// Converts arrays to a scene: its tracks, map and lights. Throws UsageError for an invalid array; the message contains
+/// the array's name, the element if there is one, and the expected and actual values.
 LoggedScene scene_from_arrays(const SceneArrays& arrays);
 
-/// Returns the dicts of a scene by their argument names in from_arrays().
+/// Converts a scene to dicts. The keys of the result are the names of the arguments of from_arrays().
 py::dict to_arrays(const LoggedScene& scene);
 
 /// Adds LINE_TYPES and LIGHT_STATES to the module.

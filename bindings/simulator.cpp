@@ -1,4 +1,4 @@
-// Simulators in Python.
+// pictura.Simulator.
 #include <optional>
 
 #include <pybind11/stl.h>
@@ -25,7 +25,7 @@ void PySimulator::run(PyController& controller, int64_t steps) {
 
 namespace {
 
-using WorldTuple = std::tuple<int, int, uint32_t>;  // map, agents, global world
+using WorldTuple = std::tuple<int, int, uint32_t>;  // index of the map, number of agents, global world
 
 std::vector<WorldSpec> worlds_of(const py::sequence& worlds) {
   std::vector<WorldSpec> specs;
@@ -118,7 +118,7 @@ void visit_options(SimulatorArguments& arguments, Visitor&& v) {
   v.value({"stream"}, arguments.stream);
 }
 
-// Defines the constructor, and properties of the construction.
+// Defines the constructor, and properties that the constructor sets.
 void define_construction(py::class_<PySimulator>* simulator) {
   def_init_with_options<SimulatorArguments>(
       simulator, {"Simulator", {"maps", "worlds"}},
@@ -164,8 +164,8 @@ Raises:
       .def("_inside",
            [](PySimulator& self) {
              py::object inside = py::cast(self.inside());
-             // Called directly instead of py::keep_alive<0, 1>: pybind11 3.1 crashes in it if the arguments are of
-             // other types.
+             // This call replaces py::keep_alive<0, 1>, in which pybind11 3.1 crashes if the arguments have wrong
+             // types.
              py::detail::keep_alive_impl(inside, py::cast(&self, py::return_value_policy::reference));
              return inside;
            })
@@ -194,7 +194,7 @@ Raises:
           py::doc("cudaStream_t of the work, as int; 0: the legacy default stream."));
 }
 
-// Defines methods that change the state, and queries of observations.
+// Defines methods that change the state or compute hypothetical observations.
 void define_steps(py::class_<PySimulator>* simulator) {
   (*simulator)
       .def(
@@ -236,7 +236,7 @@ arrays are in the simulator's memory. Returns out, arrays by name. Raises pictur
 then writes nothing; on CUDA queries are checked as in step().)");
 }
 
-// Defines the arrays of the present state.
+// Defines the arrays of the current state.
 void define_arrays(py::class_<PySimulator>* simulator) {
   (*simulator)
       .def_property_readonly(
@@ -271,7 +271,7 @@ void define_arrays(py::class_<PySimulator>* simulator) {
           py::doc("int32 [slots]: the agent's index in its world."));
 }
 
-// Defines counts, and copies of the state.
+// Defines methods that return counts or copies of the state.
 void define_totals_and_copies(py::class_<PySimulator>* simulator) {
   (*simulator)
       .def(
@@ -331,7 +331,7 @@ void define_totals_and_copies(py::class_<PySimulator>* simulator) {
           "Waits for the work on the stream; raises pictura.Error for errors found by a device.");
 }
 
-// Defines a picture, and loops in C++.
+// Defines methods that draw a world or take many steps.
 void define_drawing_and_loops(py::class_<PySimulator>* simulator) {
   (*simulator)
       .def(

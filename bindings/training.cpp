@@ -1,5 +1,5 @@
-// The extension module pictura._training_MAJOR_MINOR: training, and all that pictura._driving has, beside a torch of
-// the version that it was built with.
+// Extension module pictura._training_MAJOR_MINOR: training, and all functions of pictura._driving, for one version of
+// torch.
 #include <array>
 #include <string>
 
