@@ -21,8 +21,8 @@ std::string name_of_function(const py::function& function);
 /// Returns a function that makes controllers. These call function(observations), which must return actions, int
 /// [slots]; `observations` is a dict of NumPy arrays [slots, ...]. With a renderer, observations also contain images:
 /// `rgb`, u8 [slots, cameras, 3, height, width], black for inactive agents; `rgb_0`, `rgb_1`, ... if the cameras have
-/// several sizes. The controllers throw Error if the simulator or the renderer does not work in host memory, UsageError
-/// if the function returns anything except actions, and the exceptions that the function raises.
+/// several sizes. Simulator and renderer must work in host memory; otherwise the controllers throw Error. They throw
+/// UsageError if the function returns anything except actions, and pass on exceptions that the function raises.
 std::function<std::unique_ptr<Controller>(const Simulator&, Renderer*)> function_controllers(
     const py::function& function);
 

@@ -1,5 +1,5 @@
-// C++ objects behind Python classes, which several files of the bindings use: maps, geometries, scenes, and the
-// contents of simulators, renderers and controllers, which the extension modules exchange.
+// C++ objects behind Python classes, for several files of the bindings: maps, geometries and scenes. Also the contents
+// of simulators, renderers and controllers, which the extension modules pass to each other.
 #pragma once
 
 #include <functional>

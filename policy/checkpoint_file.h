@@ -1,8 +1,8 @@
 // Format of checkpoint files. A checkpoint contains a policy and all other data that a run needs to continue
-// (training/checkpoint.h). Layout: the eight bytes PICTCKPT, u32 version, u32 byte order mark, u64 length of a JSON
-// header, the header, the data that the header describes, u64 hash (FNV-1a) of all preceding bytes. Files of version 1
-// have no hash at the end; their header contains a hash of the data instead. Only code that reads and writes
-// checkpoints should include this header.
+// (training/checkpoint.h). A file contains, in this order: the eight bytes PICTCKPT; u32 version; u32 byte order mark;
+// u64 length of a JSON header; the header; the data that the header describes; u64 hash (FNV-1a) of all preceding
+// bytes. Files of version 1 have no hash at the end; their header contains a hash of the data instead. Only code that
+// reads and writes checkpoints should include this header.
 #pragma once
 
 #include <string>

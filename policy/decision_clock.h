@@ -8,9 +8,9 @@
 
 namespace pictura {
 
-/// Decision clock of one simulator. All agents decide at steps divisible by policy.decision_steps. An agent that has
-/// just begun (its world was reset, its life began, or it was inactive at the previous step) decides immediately, and
-/// holds this action until the next step divisible by policy.decision_steps.
+/// Decision clock of one simulator. All agents decide at steps divisible by policy.decision_steps. An agent also
+/// decides in its first step: after a reset of its world, at the start of a life, or if it was inactive at the previous
+/// step. It holds this action until the next step divisible by policy.decision_steps.
 class DecisionClock {
  public:
   explicit DecisionClock(int64_t decision_steps) : decision_steps_(decision_steps) {}

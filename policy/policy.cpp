@@ -273,10 +273,10 @@ class PerspectiveEncoder final : public SceneEncoder {
 
   // Computes the attention of each camera's queries, [cameras, queries, width], to the tokens of its images, [cameras *
   // batch, tokens, width]. Returns [cameras * batch, queries, width]. Queries are parameters, equal for all images, so
-  // keys and values of single tokens are not needed: scores are (q W) t instead of q (W t), and the value and output
-  // layers are applied to the weighted sums of tokens, as one product. There is no key bias, because it would add the
-  // same number to all scores of a query, which does not change the softmax. The value bias is added once, because
-  // attention weights sum to 1.
+  // keys and values of single tokens need not be computed. Scores are (q W) t instead of q (W t). The value and output
+  // layers are one product, applied to the weighted sums of tokens. There is no key bias, because it would add the same
+  // number to all scores of a query, which does not change the softmax. The value bias is added once, because attention
+  // weights sum to 1.
   at::Tensor attend(const at::Tensor& queries, const at::Tensor& tokens) const {
     const int64_t cameras = queries.size(0), heads = config_.attention_heads, head_width = width_ / heads;
     const at::Tensor key = key_.unflatten(0, {heads, head_width});

@@ -128,8 +128,8 @@ struct Decision {
   /// Whether all logits and values are finite. Waits for the device.
   bool is_finite() const { return are_finite().item<bool>(); }
 };
-/// Runs the policy for the agents with row numbers `rows`, i64 [batch], chunk by chunk. act(rows) must return the
-/// policy's output for the rows of a chunk; the output need only be valid until the next call.
+/// Runs the policy, chunk by chunk, for the agents with row numbers `rows`, i64 [batch]. act(rows) must return the
+/// policy's output for the rows of a chunk. The output must be valid only until the next call.
 Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
                 const std::function<Policy::Output(const at::Tensor& rows)>& act);
 

@@ -57,8 +57,9 @@ RendererConfig evaluation_renderer_config(const Config& config, const Rig& rig, 
 class PolicySession {
  public:
   /// Opens the policy of a checkpoint, or of a safetensors file that training or `pictura export` wrote. Throws Error,
-  /// which names the file, if it is neither, if it is truncated, if it has another observation schema or architecture,
-  /// or if the policy cannot run on this device. Throws UsageError if the policy cannot use the cameras of the options.
+  /// which names the file, if the file is neither or is truncated, if its observation schema or architecture differs
+  /// from the current one, or if the policy cannot run on this device. Throws UsageError if the policy cannot use the
+  /// cameras of the options.
   explicit PolicySession(const std::string& path, const SessionOptions& options = {});
   /// Wraps a policy with its configuration and the cameras of `rig`, which are not randomized. Every call uses the
   /// current weights of the policy. The policy must outlive the session. Builds without torch do not have this
@@ -105,11 +106,11 @@ class PolicySession {
   /// batch size.
   void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out, Span<float> values_out);
 
-  /// Creates a controller for a simulator on device(). With `argmax`, it chooses the most likely action; otherwise it
-  /// draws actions as training does, with random numbers that depend only on (seed, global world, agent, episode,
-  /// step). Each action is held for policy.decision_steps steps, counted from the first act(). For `renderer` see
-  /// evaluate(). The session and the renderer must outlive the controller. Images are drawn only for agents that choose
-  /// a new action. hides_auxiliary: see PolicyInput.
+  /// Creates a controller for a simulator on device(). With `argmax`, it chooses the most likely action. Otherwise it
+  /// draws actions as training does; draws depend only on (seed, global world, agent, episode, step). Each action is
+  /// held for policy.decision_steps steps, counted from the first act(). For `renderer` see evaluate(). The session and
+  /// the renderer must outlive the controller. Images are drawn only for agents that choose a new action.
+  /// hides_auxiliary: see PolicyInput.
   std::unique_ptr<PolicyController> make_controller(Renderer* renderer, bool argmax, uint64_t seed,
                                                     bool hides_auxiliary = false);
 

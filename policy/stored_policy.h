@@ -37,9 +37,9 @@ struct StoredPolicy : PolicyFacts {
 };
 
 /// Reads the policy of a checkpoint, or of a safetensors file that write_stored_policy() wrote. With `average`, it
-/// reads the average of weights, which some checkpoints contain. Throws Error, which names the file, if it is neither,
-/// if it is truncated or damaged, if it has another observation schema (the message names the different entry), or if
-/// it has no average although `average` is set.
+/// reads the average of weights, which some checkpoints contain. Throws Error, which names the file, if the file is
+/// neither, is truncated or damaged, or has no average although `average` is set. Also throws Error if its observation
+/// schema differs from the current schema; the message names the first different entry.
 StoredPolicy read_stored_policy(const std::string& path, bool average = false);
 /// Returns the bytes of a policy file.
 std::string read_policy_file(const std::string& path);

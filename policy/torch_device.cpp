@@ -31,8 +31,8 @@ std::string cuda_rejection_reason() {
 Device open_learning_device(const Config& config, int local_rank) {
   const std::string &wanted = config.run.device, &simulator = config.simulator.backend,
                     &renderer = config.render.backend;
-  // Torch's CUDA library must be loaded before all computation, even on the host: torch looks for it only once, and a
-  // process that learns on the host may use a device later.
+  // Torch's CUDA library must be loaded before all computation, because torch looks for it only once. Even a process
+  // that learns on the host may use a device later.
   const std::string why_not = cuda_rejection_reason();
   const bool draws_on_host =
       config.reads_images() && (renderer == "cpu" || renderer == "null" || renderer == "gl:osmesa");

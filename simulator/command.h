@@ -16,9 +16,9 @@ enum class CommandKind : int32_t {
 /// Command of one slot for one step. An agent that is neither active nor recorded obeys only the command `recorded`.
 /// - action: in [0, kNumActions).
 /// - kinematic_state: the agent's reference point (see fields.h), heading and speed after the step. Its acceleration,
-///   jerk and steering angle become 0. z_m selects the level on which the road under the agent is searched; the agent
-///   then gets the height of that road. Events are detected as for actions: collisions along the straight line to the
-///   pose, leaving the road, red lights and waypoints. Numbers must be finite, with |x_m|, |y_m| and |z_m| at most
+///   jerk and steering angle become 0. z_m selects the level on which the road under the agent is searched. The agent
+///   gets the height of that road. Events are detected as for actions: collisions along the straight line to the pose,
+///   leaving the road, red lights and waypoints. Numbers must be finite, with |x_m|, |y_m| and |z_m| at most
 ///   kMaxCommanded_m,
 ///   |heading_rad| at most kMaxCommanded_rad, and |speed_mps| at most kMaxCommanded_mps.
 /// - absent: from this step until the end of the episode the agent is AgentStatus::absent: it is not drawn, does not

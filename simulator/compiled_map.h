@@ -24,7 +24,7 @@ struct MapOptions {
   bool recorded_lights = false;  // include the lights of a recorded scene, see compile_scenario()
   // Maximum length of observed pieces of lanes and boundaries. 0: as in training, pieces are at most 10 m long and
   // deviate at most 0.25 m from curves. Above 0: each part that is straight within 2 cm is cut evenly into pieces of at
-  // most this length (paper, evaluation protocol: long segments of logged maps are subdivided at observation time).
+  // most this length, as in the paper's evaluation of recorded scenes.
   float observed_span_m = 0;
   bool operator==(const MapOptions&) const = default;
 };

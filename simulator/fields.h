@@ -95,7 +95,7 @@ constexpr int kNumWaypoints = 3;
   X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                          \
   X(episode_return, float, 1, 0, "sum of rewards in this episode")
 
-// Fields of lives. A life lasts from an agent's start or entry until it leaves the map; on maps with roads that end,
+// Fields of lives. A life lasts from an agent's start or entry until it leaves the map. On maps with roads that end,
 // several lives follow each other in a slot. On other maps these fields keep their initial values, and saved states and
 // hashes omit them.
 #define PICTURA_LIFE_FIELDS(X)                                                                     \

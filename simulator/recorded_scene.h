@@ -19,9 +19,9 @@ constexpr float kRecordedHeadAhead_m = 15.0f, kRecordedHeadHeight_m = 5.0f;
 /// starts an episode in its recorded state at start_step, or absent if it has none. With options.recorded_lights, the
 /// road has the scene's lights with their recorded states: they are drawn, observed, and stop traffic. Recordings
 /// contain no positions of light heads; heads are placed kRecordedHeadAhead_m past the middle of the stop line and
-/// kRecordedHeadHeight_m above it. Throws Error, which names scene and track, if the map has no drivable lane, if there
-/// are more than kMaxAgentsPerWorld tracks, or if a track is too large to be simulated. Throws UsageError for a null
-/// pointer, or if the recording has no step start_step.
+/// kRecordedHeadHeight_m above it. Throws Error if the map has no drivable lane, if there are more than
+/// kMaxAgentsPerWorld tracks, or if a track is too large to be simulated; the message names scene and track. Throws
+/// UsageError for a null pointer, or if the recording has no step start_step.
 std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenario> scenario,
                                                     const MapOptions& options = {}, int32_t start_step = 0);
 
@@ -32,8 +32,9 @@ std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenar
 std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<const int32_t> driven,
                                                Span<const int32_t> replayed, int num_agents);
 
-/// Adapts a configuration to a scene: the recording's time step, episodes from start_step to the end of the recording,
-/// no walls, no parked cars besides the scene's tracks, no early end of episodes, and dynamics multipliers of 1.
+/// Adapts a configuration to a scene. Sets the recording's time step, episodes from start_step to the end of the
+/// recording without early end, and dynamics multipliers of 1. Removes walls, and parked cars besides the scene's
+/// tracks.
 SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step = 0, SimulatorConfig config = {});
 
 /// Returns the world of a scene's map, with all of its tracks.

@@ -66,8 +66,8 @@ void set_scene_rule(const std::string& assignment, SceneProtocol* protocol_inout
 /// Returns names and values of all rules.
 std::vector<std::pair<std::string, std::string>> rules_of(const SceneProtocol& protocol);
 
-/// Throws UsageError, which names the setting, if a setting is invalid: for instance steps below 1, a density outside
-/// (0, 1], or a word in `control` that names no kind of tracks, such as an id.
+/// Throws UsageError, which names the setting, if a setting is invalid. Examples are steps below 1, a density outside
+/// (0, 1], and a word in `control` that names no kind of tracks, such as an id.
 void check(const SceneProtocol& protocol);
 
 /// Row of the paper's table on WOMD (zero-shot self-play, 44,073 scenes of the validation set).

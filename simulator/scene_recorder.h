@@ -29,8 +29,8 @@ class SceneRecorder final : public StepObserver {
   int32_t num_steps() const { return num_steps_; }
 
   /// Returns the scene so far. Its tracks are the agents that were present at any step. The id of a track is the index
-  /// of the agent's box in the world. On roads that end, each life is a track: life k of box b (both from 0) has the id
-  /// b plus k times the number of boxes. self_agent is the agent whose track is the self-driving car; -1: none. In a
+  /// of the agent's box in the world. On roads that end, each life is a track: life k of box b (both counted from 0)
+  /// has the id b + k * (number of boxes). self_agent is the agent whose track is the self-driving car; -1: none. In a
   /// world of a recorded scene, ids, types, recorded lights and the self-driving car are those of that scene. An empty
   /// `id` is replaced by an id made of the map's name, seed, world and episode. Throws UsageError if self_agent was
   /// never present.

@@ -76,8 +76,8 @@ constexpr const char* name_of(LightCycles cycles) { return kLightCyclesNames[sta
 /// name.
 LightCycles light_cycles_named(std::string_view name);
 
-/// Returns the type of light cycles of a map in worlds of this configuration: "recorded" if the map has recorded
-/// lights, "none" if it has no lights, else the name of the configuration's light cycles.
+/// Returns a text on the light cycles of a map in worlds of this configuration: "none" if the map has no lights,
+/// "recorded" if it has recorded lights, else the name of config.light_cycles.
 std::string light_cycles_text(const SimulatorConfig& config, const CompiledMap& map);
 
 /// One world: the index of its map among the simulator's maps, and the requested number of controlled agents.
@@ -204,20 +204,20 @@ class Simulator {
   /// the road on the level of z_m), its box, view and observation. The halt_reason of an active agent becomes 0. An
   /// agent that found no place and now gets one counts as spawned. The results of the last step remain unchanged.
   /// Throws Error, leaving the state unchanged, for other names, types, shapes or devices, for derived fields (see
-  /// is_derived() in agent_state_arrays.h), and for slots and values that restore() would reject. On a device, poll(),
-  /// check() or the next call throws the errors of slots and values. There the call does not wait, and a CUDA graph can
-  /// capture it.
+  /// is_derived() in agent_state_arrays.h), and for invalid slots and values. On a device, poll(), check() or the next
+  /// call throws the errors of slots and values. There the call does not wait, and a CUDA graph can capture it.
   void set_state(const Array& slots, Span<const NamedArray> fields, Stream stream = {});
 
   /// Writes hypothetical observations: those that slots would have if some boxes were hidden and other boxes inserted.
-  /// Query i writes row i of `out`. Only the partners can differ from observations(), which stay unchanged, as do state
-  /// and results. hidden: indices into scene().agents, as in SceneBatch::hidden_agents, so that the same list can be
-  /// used for views. out: one array [queries, rows, features] for each array that the simulator observes; all others
-  /// are empty. All spans must be in memory of device(). Throws Error, without writing, for arrays of other lengths,
-  /// for more than 2^24 queries, and for invalid queries. A query is invalid if its slot or a range is out of bounds,
-  /// if a hidden box is in another world, or if an inserted box has numbers that are not finite. On a device, poll(),
-  /// check() or the next call throws the errors of queries, and partners, lanes, boundaries and walls must begin at a
-  /// multiple of 16 bytes. There the call neither allocates nor waits, and a CUDA graph can capture it.
+  /// Query i writes row i of `out`. Only the partners (observed road users) can differ from those of observations().
+  /// State, observations() and results stay unchanged. hidden: indices into scene().agents, as in
+  /// SceneBatch::hidden_agents, so that the same list can be used for views. out: one array [queries, rows, features]
+  /// for each array that the simulator observes; all others are empty. All spans must be in memory of device(). Throws
+  /// Error, without writing, for arrays of other lengths, for more than 2^24 queries, and for invalid queries. A query
+  /// is invalid if its slot or a range is out of bounds, if a hidden box is in another world, or if an inserted box has
+  /// numbers that are not finite. On a device, poll(), check() or the next call throws the errors of queries, and
+  /// partners, lanes, boundaries and walls must begin at a multiple of 16 bytes. There the call neither allocates nor
+  /// waits, and a CUDA graph can capture it.
   void observe(Span<const ObservationQuery> queries, Span<const int32_t> hidden, Span<const InsertedBox> inserted,
                const ObservationView& out, Stream stream = {});
 

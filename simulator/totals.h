@@ -1,5 +1,5 @@
-// Totals of a simulator. Every executor adds floating-point numbers in the same order, so that sums are bit-identical:
-// agent i of a world adds to bin i mod kTotalsBins, and the bins are added in order.
+// Totals of a simulator. Every executor adds floating-point numbers in the same order, so that sums are bit-identical.
+// Agent i of a world adds to bin i mod kTotalsBins; then the bins are added in order.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -23,19 +23,19 @@ constexpr float kRest_mps = 0.3f;  // agents up to this speed count as at rest
 
 // COUNT(total, ...) declares an integer, SUM(total) a floating-point sum, TERMS(total) a floating-point sum for each
 // reward term.
-#define PICTURA_TOTALS(COUNT, SUM, TERMS)                                                      \
-  COUNT(agent_steps) /* active agents advanced by one step */                                  \
-  COUNT(slot_steps)  /* slots times steps */                                                   \
-  COUNT(episodes)    /* worlds reset after their first episode */                              \
-  PICTURA_EVENT_TOTALS(COUNT)                                                                  \
-  SUM(distance_m)                                                                              \
-  SUM(reward)                                                                                  \
-  TERMS(reward_terms)             /* summands of `reward`, except for rounding */              \
-  COUNT(finished_agent_episodes)  /* agents whose episode ended */                             \
-  SUM(finished_return)            /* sum of the returns of these agents */                     \
-  COUNT(finished_passed_waypoint) /* of these agents, those that passed a waypoint */          \
-  COUNT(finished_moved)           /* of these agents, those faster than kRest_mps in a step */ \
-  SUM(finished_first_motion_s)    /* over moved agents: time from the start to the end of that step */
+#define PICTURA_TOTALS(COUNT, SUM, TERMS)                                                       \
+  COUNT(agent_steps) /* steps of single active agents */                                        \
+  COUNT(slot_steps)  /* number of slots times steps */                                          \
+  COUNT(episodes)    /* worlds reset after their first episode */                               \
+  PICTURA_EVENT_TOTALS(COUNT)                                                                   \
+  SUM(distance_m)                                                                               \
+  SUM(reward)                                                                                   \
+  TERMS(reward_terms)             /* terms of `reward`; their sum differs by rounding */        \
+  COUNT(finished_agent_episodes)  /* agents whose episode ended */                              \
+  SUM(finished_return)            /* sum of the returns of these agents */                      \
+  COUNT(finished_passed_waypoint) /* of these agents, those that passed a waypoint */           \
+  COUNT(finished_moved)           /* of these agents, those that moved faster than kRest_mps */ \
+  SUM(finished_first_motion_s)    /* sum over these: time from the start to the motion */
 
 /// Totals of controlled agents since the simulator's construction.
 struct SimulatorTotals {

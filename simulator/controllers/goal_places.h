@@ -27,8 +27,8 @@ struct GoalReach {
 
 /// Tests the first `chains` chains of every active agent of a world before its first step. Element 0 of the result
 /// counts vehicles and cyclists, element 1 pedestrians. A waypoint on a lane is reachable if the lane graph has a route
-/// of at most 120 m to it from the previous waypoint. A waypoint on a walkway is reachable if pieces of walkways lead
-/// to it on which a pedestrian of maximum size touches no wall, and if no wall or parked car covers it.
+/// of at most 120 m to it from the previous waypoint. A waypoint on a walkway is reachable if no wall or parked car
+/// covers it and pieces of walkways lead to it on which a pedestrian of maximum size touches no wall.
 std::array<GoalReach, 2> follow_goals(const WorldView& world, const LaneGraph& graph, uint32_t chains);
 
 }  // namespace pictura

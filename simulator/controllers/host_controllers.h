@@ -32,8 +32,9 @@ void check_worlds(std::string_view controller, const Simulator& simulator);
 /// simulator does not work in host memory.
 std::unique_ptr<Controller> make_host_controller(const std::string& name, const Simulator& simulator, uint64_t seed);
 
-/// Throws Error, which names the controller `who`, unless `commands` has one element per slot, the mask has one element
-/// per slot or is empty, and `input` is in the memory of `device`.
+/// Checks arguments of Controller::act(): `commands` must have one element per slot, the mask must have one element per
+/// slot or be empty, and `input` must be in the memory of `device`. Otherwise throws Error, which names the controller
+/// `who`.
 void check_controller_arrays(std::string_view who, const SimulatorArrays& input, Device device,
                              Span<const uint8_t> mask, Span<const Command> commands);
 

@@ -24,9 +24,9 @@ struct InverseActions {
 /// Finds the actions by a beam search, which keeps the best kBeamWidth sequences of actions. Each run of consecutive
 /// recorded states is searched separately. A run starts from its first state with accelerations and steering angle 0,
 /// because recorded agents have these values. The cost of a sequence is the sum of squared distances from the recorded
-/// positions, of a small cost for deviations of speed and heading, which prevents weaving, and of a predicted cost of
-/// returning to the record from the last motion. Multipliers of the dynamics are 1; `rules` must be those of the worlds
-/// in which the actions will be used. Throws UsageError for a map without a record.
+/// positions. It also contains a small cost for deviations of speed and heading, which prevents weaving, and a
+/// predicted cost of returning to the record from the last motion. Multipliers of the dynamics are 1; `rules` must be
+/// those of the worlds in which the actions will be used. Throws UsageError for a map without a record.
 InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int num_threads = 0,
                                     const DynamicsRules& rules = {});
 constexpr int kBeamWidth = 48;

@@ -244,8 +244,8 @@ float LaneKeepingAgent::speed_before_light(const Motion& now) {
 }
 
 /// Returns the distance along the route from the front bumper to the next closed stop line: one whose light is red, or
-/// yellow with enough distance to stop. Returns 1000 if there is none ahead. At a line near the bumper, the agent's
-/// exact position is used, because the path's points are too coarse to tell whether the bumper is past the line.
+/// yellow with enough distance to stop. Returns 1000 if there is none ahead. For a line near the bumper, the exact
+/// position of the agent is used: the path's points are too coarse to tell whether the bumper is past the line.
 float LaneKeepingAgent::to_closed_line(const Motion& now) const {
   constexpr float kLookahead_m = 45, kAt_m = 1;
   const Vec2 here = points()[place_].position_m.xy();

@@ -48,12 +48,7 @@ class LaneKeepingAgent {
   static constexpr size_t kMaxSearchNodes = 300'000, kMaxSearchNodesOfOpen = 2'000, kSearchNodesPerStep = 500,
                           kMinSearchNodes = 20'000;
 
-  enum class Driving {
-    pursues,
-    brakes,
-    brakes_straight
-  };  // follows the path; brakes on the path; brakes with
-      // straight steering
+  enum class Driving { pursues, brakes, brakes_straight };  // follow the path; brake on it; brake straight ahead
 
   void follow_goals();
   void plan();

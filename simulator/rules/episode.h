@@ -29,8 +29,9 @@ PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& co
   return is_valid(command) && (has_record(world.map) || !is_follow_record_command(command));
 }
 
-/// Whether a step of the agent is counted and used for learning: the agent takes actions, the command is neither to
-/// leave nor to follow the record, and in this episode the agent is neither impaired nor driven by another policy.
+/// Whether a step of the agent is counted and used for learning. The agent must take actions, and the command must
+/// neither be to leave nor to follow the record. In this episode, the agent must neither be impaired nor driven by
+/// another policy.
 template <typename CommandType>
 PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType& command) {
   return takes_actions(world, agent) && !is_leave_command(command) && !is_follow_record_command(command) &&
@@ -38,8 +39,8 @@ PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType&
 }
 
 /// Whether the agent counts as active in the test whether the episode ends. Agents that wait to enter count. Absent
-/// agents of a map with a record count too, because they may appear later; but not if some tracks are replayed, because
-/// then all agents are present from the start.
+/// agents of a map with a record count too, because they may appear later. They do not count if some tracks are
+/// replayed, because all agents are then present from the start.
 PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
   const auto status = world.agents.status[world.first_slot + agent];
   if (has_replayed_tracks(world.map)) return takes_actions(status);
@@ -118,8 +119,8 @@ PICTURA_HD inline int max_steps_of(const WorldView& world) {
   return kMinSteps + random.below(episode_steps - kMinSteps + 1);
 }
 
-/// Whether an episode of `spawned` agents, of which `active` are still active, ends after `steps` steps: the maximum
-/// number of steps is reached, too many agents are inactive, or there are no agents.
+/// Whether an episode ends after `steps` steps, when `active` of its `spawned` agents are still active. It ends if the
+/// maximum number of steps is reached, if too many agents are inactive, or if there are no agents.
 PICTURA_HD inline bool episode_ends(const WorldView& world, int steps, int spawned, int active) {
   if (steps >= max_steps_of(world) || spawned == 0) return true;
   const float inactive = static_cast<float>(spawned - active);

@@ -36,8 +36,8 @@ PICTURA_HD inline Foot foot_on(const LaneSegment& segment, Vec2 p) {
 }
 
 /// Returns the lane that fits position and heading best: the lane of minimum cost. The cost is the distance to the
-/// centre line (0.7 per 4 m), plus the angle to it (0.3 per half turn), plus 0.05 if the lane is not current_lane (-1:
-/// none), so that an agent between two lanes stays on its lane. Only lanes on the level of z_m, the agent's current
+/// centre line (0.7 per 4 m) plus the angle to it (0.3 per half turn). Lanes other than current_lane (-1: none) cost
+/// 0.05 more, so that an agent between two lanes stays on its lane. Only lanes on the level of z_m, the agent's current
 /// height, are considered. If there is no lane within kLaneReach_m, the result has lane -1 and z_m is unchanged.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane,

@@ -18,12 +18,12 @@ struct LightPlan {
   uint8_t padding[3] = {};
 };
 
-/// Draws a stop line's plan for an episode. By default (training), green U(1, 10) s, yellow U(1.5, 2.25) s, red U(0.3,
-/// 10) s and a time offset are drawn for each junction or, with independent cycles, for each light. In a fifth of the
-/// episodes all lights are off; in the others, a fifth of the lights are off. With independent cycles, a light that is
-/// not off is green during the whole episode with probability 0.05. With `fixed` (evaluation), durations are 10, 3 and
-/// 2 s; only the offset is drawn, and no light is off or always green. Lines without a junction always cycle
-/// independently.
+/// Draws a stop line's plan for an episode. By default (training), it draws green U(1, 10) s, yellow U(1.5, 2.25) s,
+/// red U(0.3, 10) s and a time offset for each junction. With independent cycles, it draws them for each light. In a
+/// fifth of the episodes all lights are off; in the others, a fifth of the lights are off. With independent cycles, a
+/// light that is not off is green during the whole episode with probability 0.05. With `fixed` (evaluation), durations
+/// are 10, 3 and 2 s; only the offset is drawn, and no light is off or always green. Lines without a junction always
+/// cycle independently.
 PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light, LightCycles cycles, bool fixed,
                                             float dt_s, uint64_t seed, uint32_t world, uint32_t episode) {
   constexpr float kOffFraction = 0.2f, kAlwaysGreenFraction = 0.05f;
@@ -135,11 +135,11 @@ PICTURA_HD inline bool is_lane_change(const MapView& map, int32_t before, int32_
 }
 
 /// Whether the step violates stop line `light`. `state` is the light's state during the step, which the agent observed
-/// before the step. A violation requires a red light and one of two events: the front bumper crosses the line, or the
-/// agent changes from a lane without a light to a lane of this light with its bumper already past the line. An event
-/// counts only on the line's level, if the heading is within 45 degrees of the line's direction, and if the bumper is
-/// within 10 m of the line's middle. It is no violation to stand on a line that turns red, to clear the junction behind
-/// the line, or to enter the next lane of the route.
+/// before the step. A violation requires a red light and one of two events. Either the front bumper crosses the line,
+/// or the agent, with its bumper already past the line, changes from a lane without a light to a lane of this light. An
+/// event counts only on the line's level, if the heading is within 45 degrees of the line's direction, and if the
+/// bumper is within 10 m of the line's middle. It is no violation to stand on a line that turns red, to clear the
+/// junction behind the line, or to enter the next lane of the route.
 PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossing& crossing, LightState state) {
   if (state != LightState::red) return false;
   const StopLine& line = map.stop_lines[light];

@@ -237,8 +237,8 @@ PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, cons
   return group.any(covers);
 }
 
-/// Whether a car may park at `spot` with this box: the box touches no barrier and no lane on which agents drive and, at
-/// a kerb, its centre is off the road.
+/// Whether a car may park at `spot` with this box. The box must touch no barrier and no lane on which agents drive. At
+/// a kerb, its centre must be off the road.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool may_park(const MapView& map, const AgentBox& box, const ParkingSpot& spot,
                          const ThreadGroup& group = {}) {

@@ -44,8 +44,8 @@ PICTURA_HD inline RoutePoint advance_along_walkway(const MapView& map, RoutePoin
   return {at.lane, 0.0f};
 }
 
-/// Returns the result of fit_lane() for a pedestrian, with another height: that of the nearest walkway on the
-/// pedestrian's level within kWalkReach_m, unless the lane is nearer than the walkway.
+/// Variant of fit_lane() for pedestrians. A pedestrian gets the height of the nearest walkway on its level within
+/// kWalkReach_m, unless its lane is nearer. The other results are those of fit_lane().
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD LaneFit fit_walk(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane,
                             const ThreadGroup& group = {}) {
