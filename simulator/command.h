@@ -1,5 +1,5 @@
-// Command of an agent for one step: an action of the policy's space, a state, or leaving the episode. A plain struct
-// for host and device code.
+// Command of an agent for one step: an action, a state, leaving the episode, or following a record. A plain struct for
+// host and device code.
 #pragma once
 
 #include "pictura/simulator/actions.h"
@@ -18,9 +18,8 @@ enum class CommandKind : int32_t {
 /// - kinematic_state: the agent's reference point (see fields.h), heading and speed after the step. Its acceleration,
 ///   jerk and steering angle become 0. z_m selects the level on which the road under the agent is searched. The agent
 ///   gets the height of that road. Events are detected as for actions: collisions along the straight line to the pose,
-///   leaving the road, red lights and waypoints. Numbers must be finite, with |x_m|, |y_m| and |z_m| at most
-///   kMaxCommanded_m,
-///   |heading_rad| at most kMaxCommanded_rad, and |speed_mps| at most kMaxCommanded_mps.
+///   leaving the road, red lights and waypoints. Numbers must be finite. Coordinates must be at most kMaxCommanded_m,
+///   headings at most kMaxCommanded_rad, and speeds at most kMaxCommanded_mps, all in absolute value.
 /// - absent: from this step until the end of the episode the agent is AgentStatus::absent: it is not drawn, does not
 ///   collide, and its steps are not valid for learning. It counts as inactive when the share of inactive agents ends an
 ///   episode.

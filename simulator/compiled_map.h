@@ -17,7 +17,7 @@ struct Scenario;
 struct SimulatorConfig;
 
 struct MapOptions {
-  bool walls = true;  // along the building lines
+  bool walls = true;  // whether walls stand along the map's building lines
   uint64_t wall_seed = 0;
   LightHeads light_heads = LightHeads::as_mapped;
   bool observe_walls = false;    // make walls observable: build rules.near_wall_pieces

@@ -1,5 +1,5 @@
 // Sizes of the observation (paper, table of the policy architecture) and its arrays. docs/reference/observation.md
-// defines every slot, its unit and its scale.
+// defines every observed number, its unit and its scale.
 #pragma once
 
 #include "pictura/common/span.h"
@@ -24,8 +24,8 @@ constexpr int kNumEntitySets = 5;
 /// SimulatorConfig::vector_observations, and `walls` if SimulatorConfig::wall_observations is set too.
 enum class ObservationPart : uint8_t { own, sets, walls };
 
-// X(name, type, rows, features, part, comment): the arrays of an observation, [slots, rows, features]. This list is the
-// only one: simulators, observation_arrays(), bindings and policies all use it.
+// X(name, type, rows, features, part, comment): the arrays of an observation, [slots, rows, features]. Simulators,
+// observation_arrays(), bindings and policies all use this list.
 #define PICTURA_OBSERVATION_ARRAYS(X)                                                                            \
   X(ego, float, 1, kEgoFeatures, ObservationPart::own, "")                                                       \
   X(partners, float, kMaxPartners, kPartnerFeatures, ObservationPart::sets, "")                                  \

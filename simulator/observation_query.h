@@ -19,7 +19,7 @@ struct ObservationQuery {
 /// A hypothetical box. It is ignored if box.drawn is 0.
 struct InsertedBox {
   AgentBox box;
-  float speed_mps = 0;  // signed, along the heading; observed in the auxiliary slot
+  float speed_mps = 0;  // signed, along the heading; observed as an auxiliary feature
 };
 
 /// Queries, the lists to which they refer, and the output. The output has one row per query, in the arrays that the

@@ -37,7 +37,8 @@ std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<cons
 /// tracks.
 SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step = 0, SimulatorConfig config = {});
 
-/// Returns the world of a scene's map, with all of its tracks.
+/// Returns a world on a scene's map whose agents are all tracks of the scene. `index` is the index of the map among a
+/// simulator's maps.
 WorldSpec scene_world(const CompiledMap& map, int index = 0, uint32_t global_world = 0);
 
 /// Returns [tracks]: 1 for each selected track, else 0. `words` are separated by commas: self or sdc (the self-driving

@@ -15,7 +15,7 @@ namespace pictura {
 std::vector<WorldSpec> worlds_in_part(const std::vector<WorldSpec>& all, int part, int num_parts);
 
 /// Joins the saved states of several simulators, one per part of worlds_in_part(), into the saved state of a simulator
-/// of all worlds. `simulator` is any simulator of these: it provides configuration and maps. Throws Error as
+/// of all worlds. `simulator` is any of these simulators: it provides configuration and maps. Throws Error as
 /// Simulator::restore does.
 std::vector<uint8_t> join_saved_states(const Simulator& simulator, const std::vector<WorldSpec>& all,
                                        const std::vector<std::vector<uint8_t>>& parts);

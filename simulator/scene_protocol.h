@@ -70,7 +70,8 @@ std::vector<std::pair<std::string, std::string>> rules_of(const SceneProtocol& p
 /// (0, 1], and a word in `control` that names no kind of tracks, such as an id.
 void check(const SceneProtocol& protocol);
 
-/// Row of the paper's table on WOMD (zero-shot self-play, 44,073 scenes of the validation set).
+/// Row of the paper's table on the Waymo Open Motion Dataset (zero-shot self-play, 44,073 scenes of the validation
+/// set).
 struct PaperSceneRow {
   const char* agent;
   double density, at_fault, off_road, goals;

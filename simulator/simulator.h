@@ -33,14 +33,14 @@ constexpr int kMaxBoxes = 1 << 24;  // agents and parked cars of one simulator; 
 /// Configuration of a simulator. The defaults are those of the paper's training.
 struct SimulatorConfig {
   uint64_t seed = 0;
-  Device device;        // device of observations and scenes; selects the executor if its name is `auto`
+  Device device;        // device of observations and scenes; the executor name `auto` selects by it
   int num_threads = 0;  // host threads; 0: all
   float dt_s = 0.1f;    // in [0.01, 0.1]
   int episode_steps = 1280;
   float reset_inactive_fraction = 0.4f;  // a world resets when this share of its agents is inactive; > 1: never
   bool stagger_episodes = false;         // whether the first episodes of worlds have random lengths, see max_steps_of()
   AfterInfraction after_infraction = AfterInfraction::halt;
-  bool leave_at_goal = false;  // an agent that passes a goal within 2 m is absent for the rest of the episode
+  bool leave_at_goal = false;  // whether agents become absent after they pass a goal within 2 m
   float pedestrian_fraction = 0.1f, cyclist_fraction = 0.1f;  // shares of the agents; all others are vehicles
   int parked_cars = 32;                                       // number per world; each episode places them again
   bool walls = true;
@@ -51,7 +51,7 @@ struct SimulatorConfig {
   LightCycles light_cycles = LightCycles::phases;
   DynamicsRules dynamics{};
   OtherShares others{};
-  bool auxiliary_observations = true;  // false: auxiliary slots are zeros
+  bool auxiliary_observations = true;  // false: auxiliary features are zeros
   bool vector_observations = true;     // false: no entity sets, as in training from images
   bool wall_observations = false;      // whether walls are observed; no rows if `walls` is false
   std::array<ConditioningRange, kNumConditioning> conditioning = default_conditioning();
@@ -120,7 +120,7 @@ SimulatorCapacity capacity_of(const CompiledMaps& maps, const std::vector<WorldS
 struct SimulatorParts {
   SimulatorConfig config;
   CompiledMaps maps;
-  std::vector<GeometryHandle> handles;  // [maps] handles of the maps in the scene's worlds
+  std::vector<GeometryHandle> handles;  // [maps] handles by which scenes refer to the maps
   std::vector<WorldSpec> worlds;
 };
 
@@ -134,7 +134,7 @@ class StateSnapshot {
 struct SpawnReport {
   int64_t asked = 0, spawned = 0, refused = 0;      // asked == spawned + refused
   int64_t refused_no_place = 0, refused_taken = 0;  // `refused` by SpawnFailure
-  int64_t entered = 0, left = 0;  // on roads that end: agents that entered or left after the episode's start
+  int64_t entered = 0, left = 0;                    // on roads that end: numbers of later entries, and of departures
   int64_t parked_asked = 0, parked_placed = 0;
 };
 
@@ -237,7 +237,7 @@ class Simulator {
   /// Waits for the work on this stream, then calls poll().
   virtual void check(Stream /*stream*/ = {}) {}
 
-  // On a device, each of the following waits for the work on its stream and copies to the host.
+  // On a device, each of the following functions waits for the work on its stream and copies to the host.
   virtual SpawnReport spawn_report(Stream stream = {}) const = 0;
   virtual const SimulatorTotals& totals(Stream stream = {}) const = 0;
   /// Hash of the agents' fields, the light states and the parked cars; equal on all executors.

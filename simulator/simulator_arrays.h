@@ -27,7 +27,7 @@ struct SimulatorArrays {
   SlotTable slots;
   ObservationView observations;
   SceneBatch scene;            // boxes by world: controlled agents, then parked cars
-  Span<const uint8_t> driver;  // [slots] who drives the agent in this episode, see driver_of() in rules/impairment.h
+  Span<const uint8_t> driver;  // [slots] driver of the agent in this episode, see driver_of() in rules/impairment.h
   Span<const View> views;      // [slots] see Simulator::views()
   AgentStateView state{};
   // [worlds] Number of steps in the current episode; index of the episode; 1 if the episode has ended, so that the next

@@ -24,9 +24,9 @@ struct SimulatorSetup;
 /// Drives one vehicle or cyclist of a world through one life.
 class LaneKeepingAgent {
  public:
-  /// Must be called before the first step of the agent's life. `graph` is the lane graph of the world's map. The graph
-  /// and the arrays of `world` must outlive this object; act() reads the current state of agents and lights from them.
-  /// `search_nodes` is the budget of search nodes that remains from the slot's previous life.
+  /// The object must be constructed before the first step of the agent's life. `graph` is the lane graph of the world's
+  /// map. The graph and the arrays of `world` must outlive this object; act() reads the current state of agents and
+  /// lights from them. `search_nodes` is the budget of search nodes that remains from the slot's previous life.
   LaneKeepingAgent(const WorldView& world, int agent, const LaneGraph& graph, size_t search_nodes = kMaxSearchNodes);
 
   /// Returns the action for the current state of agents and lights.

@@ -76,11 +76,11 @@ PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, con
   return false;
 }
 
-/// Whether an agent is at fault for a collision (paper): it is not if it is almost at rest or struck from behind. A
-/// reversing agent is never struck from behind. Any other agent is struck from behind if, before the step, the nearer
-/// end of the other box was behind the plane of the agent's rear bumper. The nearer end is the middle of the other
-/// box's front or rear: the one that is farther forward as seen from the agent. own_speed_mps is the agent's speed in
-/// the step.
+/// Whether an agent is at fault for a collision (paper). An agent is not at fault if it is almost at rest or is struck
+/// from behind. A reversing agent is never struck from behind. Any other agent is struck from behind if, before the
+/// step, the nearer end of the other box was behind the plane of the agent's rear bumper. The nearer end is the middle
+/// of the other box's front or rear: the one that is farther forward as seen from the agent. own_speed_mps is the
+/// agent's speed in the step.
 PICTURA_HD inline bool at_fault(const AgentBox& own_before, float own_speed_mps, const AgentBox& other_before) {
   constexpr float kStopped_mps = 0.2f;
   if (fabsf(own_speed_mps) < kStopped_mps) return false;
@@ -93,7 +93,7 @@ PICTURA_HD inline bool at_fault(const AgentBox& own_before, float own_speed_mps,
   return nearer_end > rear;
 }
 
-/// Whether the segment a-b touches the box, by clipping the segment to the box's slab along each axis of the box.
+/// Whether the segment a-b touches the box. Clips the segment to the box's extent along each axis of the box.
 PICTURA_HD inline bool touches(const OrientedBox& box, Vec2 a_m, Vec2 b_m) {
   const Vec2 a = a_m - box.center_m;
   const Vec2 step = b_m - a_m;

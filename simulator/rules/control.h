@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// Action drawn uniformly from all actions.
+/// Draws an action uniformly from all actions.
 PICTURA_HD inline int32_t random_action(uint64_t seed, uint32_t global_world, int agent, uint32_t step) {
   RandomStream random({.seed = seed,
                        .world = global_world,

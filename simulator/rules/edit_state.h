@@ -103,8 +103,8 @@ PICTURA_HD int64_t find_edit_fault(const StateEdit& edit, int i, int num_slots, 
   return field == AgentField::none ? kNoEditFault : edit_fault(static_cast<int32_t>(field), i, slot);
 }
 
-/// Writes the agent of element i, which must be without error, into its world. The agent is moved without testing
-/// collisions on the way. Returns the change in the number of agents in the world's episode.
+/// Writes the agent of element i, which must be valid, to its world. The agent is moved without testing collisions on
+/// the way. Returns the change in the number of agents in the world's episode.
 PICTURA_HD inline int apply_edit(const WorldView& world, const StateEdit& edit, int i) {
   const AgentStateView& agents = world.agents;
   const int slot = edit.slots[i], agent = slot - world.first_slot;

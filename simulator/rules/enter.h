@@ -8,7 +8,7 @@ namespace pictura {
 
 constexpr float kEntryInside_m = 0.1f;  // distance of the rear bumper from the lane's start
 constexpr float kMaxEntry_mps = 8.0f;
-constexpr float kEntryGap_m = 2.0f, kEntryHeadway_s = 2.0f;  // minimum gap to the next box ahead
+constexpr float kEntryGap_m = 2.0f, kEntryHeadway_s = 2.0f;  // minimum gap: 2 m plus 2 s times the speed
 
 /// Whether an agent waits to enter. In the step in which it leaves, its box is still visible, so it cannot enter yet.
 PICTURA_HD inline bool is_waiting_to_enter(const WorldView& world, int agent) {

@@ -38,8 +38,8 @@ PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType&
          driver_kind_of(world, agent) == 0;
 }
 
-/// Whether the agent counts as active in the test whether the episode ends. Agents that wait to enter count. Absent
-/// agents of a map with a record count too, because they may appear later. They do not count if some tracks are
+/// Whether the agent counts as active when its world tests whether the episode ends. Agents that wait to enter count.
+/// Absent agents of a map with a record count too, because they may appear later. They do not count if some tracks are
 /// replayed, because all agents are then present from the start.
 PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
   const auto status = world.agents.status[world.first_slot + agent];

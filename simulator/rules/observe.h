@@ -221,8 +221,8 @@ PICTURA_HD inline bool observes_set(const WorldView& world, int agent, EntitySet
   return !is_hidden && observes(world, agent);
 }
 
-/// Writes the own arrays (all except entity sets) of an agent into a row of `out`. They are zeros for absent agents and
-/// for agents that halted in an earlier step.
+/// Writes the arrays of part `own` (all except entity sets) of an agent to a row of `out`. They are zeros for absent
+/// agents and for agents that halted in an earlier step.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_own(const WorldView& world, int agent, int row, const ObservationView& out,
                             const ThreadGroup& group = {}) {
@@ -294,7 +294,7 @@ PICTURA_HD inline void prefetch_list_near(const MapView& map, const NearPlace& p
   for (int line = 0; line < kLines; ++line) prefetch(items, line * kLineBytes);
 }
 
-/// Policy class for observe_set() in steps: rows overwrite those of the previous step.
+/// Argument of observe_set() in steps. Its rows overwrite those of the previous step.
 struct StepObservation {
   /// Returns the number of rows that may contain values other than zero. The count is clamped, because callers have
   /// access to the memory and may have changed it.

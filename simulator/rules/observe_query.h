@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// Policy class for observe_set() in queries: the destination row may contain any previous values.
+/// Argument of observe_set() in queries. The destination may contain any previous values.
 class QueriedObservation {
  public:
   PICTURA_HD QueriedObservation(const ObservationQueries& asked, const ObservationQuery& query)
@@ -73,7 +73,7 @@ PICTURA_HD inline void clear_other_counts(const ObservationView& out, int row) {
   for (int set = num_observed_sets(out); set < kNumEntitySets; ++set) counts[set] = 0;
 }
 
-/// Writes the observation of query i, which must be without error, including entity sets if `entity_sets`.
+/// Writes the observation of query i, which must be valid, including entity sets if `entity_sets`.
 PICTURA_HD inline void answer_query(const WorldView& world, const ObservationQueries& asked, int i, bool entity_sets) {
   const ObservationQuery& query = asked.queries[i];
   const int agent = query.slot - world.first_slot;

@@ -60,9 +60,9 @@ PICTURA_HD inline void leave(const WorldView& world, int agent) {
   remove_box(world, agent);
 }
 
-/// Places an agent at its recorded state `step` steps after the episode's start, or removes it if there is none. An
-/// agent that did not follow its record before is moved there without testing collisions on the way. Only the first
-/// thread of the group writes.
+/// Places an agent at its recorded state `step` steps after the episode's start, or removes the agent if that step has
+/// no recorded state. An agent that did not follow its record before is moved there without testing collisions on the
+/// way. Only the first thread of the group writes.
 template <typename ThreadGroup>
 PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
@@ -100,7 +100,7 @@ PICTURA_HD inline RecordedState replayed_state(const MapView& map, int i, int st
 }
 
 /// Places box num_agents + i, that of replayed track i, at the track's state `step` steps after the episode's start, or
-/// removes it if there is none. Only the first thread of the group writes.
+/// removes the box if the track is absent then. Only the first thread of the group writes.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void replay_track(const WorldView& world, int i, int step, const ThreadGroup& group = {}) {
   const RecordedState at = replayed_state(world.map, i, step);

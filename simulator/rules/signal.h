@@ -101,7 +101,7 @@ PICTURA_HD inline bool is_within_ends(const StopLine& line, Vec2 from_middle_m) 
   return fabsf(cross(line.direction, from_middle_m)) <= line.half_length_m + kStopLineSideTolerance_m;
 }
 
-/// Motion of an agent in a step, as far as red lights need it.
+/// Motion of an agent in a step: the data for the test of red lights.
 struct Crossing {
   Vec2 bumper_before, bumper_after;  // middle of the front bumper
   Vec2 forward;                      // unit vector after the step

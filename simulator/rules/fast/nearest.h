@@ -35,7 +35,8 @@ class NearestOfOneThread {
       load_pairs(&eight_places->x, &x, &y);
       float distance2[8];
       const Float8 apart_x = x - from.x, apart_y = y - from.y;
-      const Float8 distances2 = apart_x * apart_x + apart_y * apart_y;  // as in dot() of a vector with itself
+      const Float8 distances2 = apart_x * apart_x + apart_y * apart_y;  // with the same bits as dot() of a vector with
+                                                                        // itself
       store8(distances2, distance2);
       const uint32_t chosen = these & bits_of(distances2 < below2) & ~equal8(eight_items, except);
       copy_chosen(distance2, chosen, near_distance2 + num_near);
