@@ -1,6 +1,6 @@
 // Convolutions with few output channels on the host. A convolution by matrix products would first copy the inputs of
 // each output (its taps) into a matrix. This convolution reads taps in place and keeps the sums of several outputs in
-// registers. Single-threaded, on contiguous fp32 arrays.
+// registers. It runs in one thread on contiguous fp32 arrays.
 #pragma once
 
 #include <cstdint>

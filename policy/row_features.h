@@ -11,10 +11,10 @@ namespace pictura {
 
 /// Returns the features of rows, [..., features.count()], of this `type` and without gradient. rows: [..., columns].
 /// All features are between -1 and 1. Their order is:
-/// - for each point: p / (|p| + 4 m) for p = x and y, then p / (|p| + 20 m), then (x, y) / (distance of the point + 1
-///   m);
-/// - for a segment: p / (|p| + 4 m), then p / (|p| + 20 m), where p are the agent's two coordinates relative to the
-///   segment: along the segment from its middle, and to the left of its line.
+/// - for each point (x, y): p / (|p| + 4 m) for p = x, y; then p / (|p| + 20 m) for p = x, y; then (x, y) / (distance
+///   of the point + 1 m);
+/// - for a segment: p / (|p| + 4 m) for p = u, v; then p / (|p| + 20 m) for p = u, v. Here, u and v are the agent's
+///   coordinates relative to the segment: along the segment from its middle, and to the left of its line.
 /// A CUDA device computes them in one pass (rules/network_passes.h).
 at::Tensor row_features(const at::Tensor& rows, const RowFeatures& features, at::ScalarType type);
 

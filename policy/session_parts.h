@@ -42,7 +42,7 @@ struct SessionParts {
 Rig chosen_rig(const PolicyFacts& saved, const SessionOptions& options);
 
 /// Open a session in which torch or policy/host_network.h computes the policy. open_host_session() throws Error if the
-/// options specify another device than the host, or if policy.backbone is a program.
+/// options specify a device other than the host, or if policy.backbone is a program.
 std::unique_ptr<SessionParts> open_torch_session(const std::string& path, const SessionOptions& options);
 std::unique_ptr<SessionParts> open_host_session(const std::string& path, const SessionOptions& options);
 

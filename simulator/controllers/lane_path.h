@@ -26,7 +26,7 @@ struct PathPoint {
   LaneChange change;
   Vec3 position_m;
   float heading_rad = 0;
-  float speed_mps = 0;  // maximum
+  float speed_mps = 0;  // maximum speed
 };
 
 /// Returns the index of a point near place_m: the search starts at `from` and continues as long as the next point is
