@@ -30,15 +30,16 @@ DensityOf density_of(Density density) {
   return {kDensityNames[index], kDensityAgents[index]};
 }
 
-// Number of worlds simulated together. On a device it is at least 200, the paper's number of scenarios per density,
-// which saturates the device. Images do not limit this number, since they are drawn for only train.forward_chunk agents
+// Number of worlds simulated together. On a GPU it is at least 200, the paper's number of scenarios per density; 200
+// worlds saturate the GPU. Images do not limit this number, because they are drawn for only train.forward_chunk agents
 // at a time.
 int worlds_per_batch(Device device, int agents_per_world) {
   const int max_agents = device.is_host() ? 4096 : 32768;
   return std::max(1, max_agents / agents_per_world);
 }
 
-// Copies to the host those fields of the agents' state from which counts are computed; all other fields are empty.
+// Copies the fields of the agents' state from which counts are computed to the host. All other fields of the result are
+// empty.
 AgentState counted_state(Simulator& simulator) {
   const AgentStateView state = simulator.state();
   AgentState host(0);
@@ -59,7 +60,7 @@ AgentState counted_state(Simulator& simulator) {
   return host;
 }
 
-// Adds a life of an agent that has ended, or that the last step cuts off.
+// Adds a vehicle's life to the counts: the agent has left or halted, or the last step ends its life.
 void add_life(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
   const AgentStatus status = state.status[slot];
   if (state.agent_class[slot] != AgentClass::vehicle) return;
@@ -81,7 +82,7 @@ void add_life(const AgentStateView& state, int64_t slot, ScenarioCounts* counts)
   counts->returns += static_cast<double>(state.episode_return[slot]);
 }
 
-// Adds a slot after the last step. Lives of agents that left have been counted.
+// Adds a slot to the counts after the last step. Earlier agents of the slot, which left, are already counted.
 void add_slot(const AgentStateView& state, int64_t slot, ScenarioCounts* counts) {
   const AgentStatus status = state.status[slot];
   const bool waits = status == AgentStatus::waiting;
@@ -92,15 +93,15 @@ void add_slot(const AgentStateView& state, int64_t slot, ScenarioCounts* counts)
   if (has_body(status)) add_life(state, slot, counts);
 }
 
-// Severity of the worst infraction of a vehicle's episode; 0 without an infraction, and for agents that are no
-// vehicles.
+// Returns the severity of the worst infraction in a vehicle's episode; 0 without an infraction, and for other agents.
 int severity(const AgentStateView& state, int slot) {
   if (state.agent_class[slot] != AgentClass::vehicle) return 0;
   const uint8_t events = state.episode_events[slot];
   return (events & kEventAtFault) ? 3 : (events & kEventOffRoad) ? 2 : (events & kEventRedLight) ? 1 : 0;
 }
 
-// Returns the first agent with the most severe infraction of each world; worlds have `agents_per_world` slots each.
+// Returns for each world the agent with the most severe infraction, the first if several are equal. Each world has
+// `agents_per_world` slots.
 std::vector<int> worst_agents(const AgentStateView& state, int num_slots, int agents_per_world) {
   std::vector<int> worst;
   for (int begin = 0; begin < num_slots; begin += agents_per_world) {
@@ -145,8 +146,8 @@ void check(const EvaluateOptions& options) {
   }
 }
 
-// Returns the worlds of `count` scenarios from index `first` of the options' scenarios on. Scenarios cycle through the
-// maps.
+// Returns the worlds of at most `count` of the options' scenarios, from the index `first` on. Scenarios cycle through
+// the maps.
 std::vector<WorldSpec> worlds_of(const EvaluateOptions& options, size_t num_maps, int agents, int first, int count) {
   std::vector<WorldSpec> worlds;
   for (int i = first; i < std::min(first + count, options.scenarios); ++i) {
@@ -157,9 +158,9 @@ std::vector<WorldSpec> worlds_of(const EvaluateOptions& options, size_t num_maps
   return worlds;
 }
 
-// Drives the simulator's worlds from the start of their episodes to the last step, or until no agent is active or waits
-// to enter, since halted agents remain halted. Returns false if it was interrupted. Calls on_steps occasionally with
-// the number of completed steps, and on_left(state, slot) for each agent that left a road that ends.
+// Drives the simulator's worlds from the start of their episodes to the last step. Stops earlier if no agent is active
+// or waits to enter, because halted agents remain halted. Returns false after an interrupt. Calls on_steps occasionally
+// with the number of completed steps, and on_left(state, slot) for each agent that left a road that ends.
 template <typename OnSteps, typename OnLeft>
 bool drive_to_the_end(const Driving& driving, const EvaluateOptions& options, Simulator* simulator,
                       const OnSteps& on_steps, const OnLeft& on_left, StandingObserver* standing,

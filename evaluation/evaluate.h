@@ -1,4 +1,4 @@
-// The paper's evaluation of a saved policy, without torch headers.
+// Evaluation of a saved policy, as the Pictura paper defines it. Includes no torch headers.
 #pragma once
 
 #include <array>
@@ -24,21 +24,20 @@ Density density_named(const std::string& name);
 /// Global number of the first evaluation world. Training numbers its worlds from 0 and never reaches this number.
 constexpr uint32_t kFirstEvaluationWorld = 0x80000000u;
 
-/// Observes the worlds of an evaluation while they are driven; the simulator is the same object for each batch of
-/// worlds.
+/// Observes the worlds of an evaluation during driving. All batches of worlds run in the same simulator object.
 class EvaluationObserver : public StepObserver {
  public:
   /// Called at the start of the worlds' episodes.
   virtual void begin(Simulator& simulator) = 0;
-  /// Called when all worlds of the batch are counted; not called if an interrupt ends the batch.
+  /// Called after all worlds of the batch are counted. An interrupt ends the batch without this call.
   virtual void end() {}
 };
 
 struct EvaluateOptions : DriverOptions {
-  std::vector<std::string> maps;  // as load_map() takes them; the paper has eight towns
+  std::vector<std::string> maps;  // names of maps for load_map(); the paper uses eight towns
   std::vector<Density> densities{Density::light, Density::medium, Density::dense};
-  int agents_per_world = 0;         // > 0: replaces the densities' numbers of agents
-  std::vector<std::string> others;  // other drivers, as other_drivers() reads them; see evaluation/mixed_traffic.h
+  int agents_per_world = 0;         // > 0: replaces kDensityAgents
+  std::vector<std::string> others;  // drivers of other vehicles, see evaluation/mixed_traffic.h
   int first_scenario = 0, scenarios = 200, steps = 3000;
   std::function<void(double done_fraction, double eta_s)> on_progress;
   EvaluationObserver* observer = nullptr;
@@ -61,13 +60,13 @@ void visit_options(EvaluateOptions& options, Visitor&& v) {
 }
 
 struct EvaluateReport {
-  // Counts of the completed densities, in the order of options.densities. For each density the counts of the evaluated
-  // driver come first, then those of the other drivers.
+  // Counts of the completed densities, in the order of options.densities. For each density, the counts of the evaluated
+  // driver come first, then the counts of the other drivers.
   EvaluationResults results;
-  std::vector<EvaluateRow> rows;  // row of each result
+  std::vector<EvaluateRow> rows;  // one row per entry of results.densities
   bool interrupted = false;  // an interrupt (common/support/interrupt.h) came before the last density was completed
   // seconds: wall time without loading maps and creating the renderer. agent_steps: steps of active agents of all
-  // classes. Both are 0 for merged parts.
+  // classes. Both are 0 in a report that was merged from parts.
   double seconds = 0;
   int64_t agent_steps = 0;
 };
@@ -75,7 +74,7 @@ struct EvaluateReport {
 /// State shared by evaluations in the same worlds.
 struct EvaluationWorlds {
   CompiledMaps maps;             // EvaluateOptions::maps, compiled with the map options of the session's world
-  Renderer* renderer = nullptr;  // renderer of the session's images, with the maps as 0, 1, ...; null without images
+  Renderer* renderer = nullptr;  // for the session\'s images, with maps under handles 0, 1, ...; null without images
   std::unique_ptr<Simulator> simulator;  // created by the first evaluation
   std::string maps_hash;                 // value of EvaluationSetting::maps_hash; computed by the first evaluation
 };
@@ -83,9 +82,9 @@ struct EvaluationWorlds {
 /// Compiles the options' maps for worlds of the configuration `world`.
 CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world);
 
-/// Evaluates a driver. Scenario k is on map k modulo the number of maps, and draws its random numbers as world
-/// kFirstEvaluationWorld + k, so that it equals no training world at any seed. Throws Error naming file and key for bad
-/// input.
+/// Evaluates the policy or controller of the options. Scenario k uses map k modulo the number of maps. It draws its
+/// random numbers as world kFirstEvaluationWorld + k, so it differs from every training world at any seed. Throws Error
+/// naming file and key for bad input.
 EvaluateReport evaluate(const EvaluateOptions& options);
 /// Evaluates a session's policy, with the session's own device, renderer and cameras.
 EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options);

@@ -30,7 +30,7 @@ namespace pictura {
 
 namespace {
 
-// Number of worlds simulated together; on a device, enough worlds to saturate it.
+// Number of worlds simulated together. On a GPU the number is large enough to saturate the GPU.
 int scenes_at_once(const SceneEvaluateOptions& options, Device device) {
   if (options.scenes_at_once > 0) return options.scenes_at_once;
   return device.is_host() ? 16 : 256;
@@ -122,7 +122,7 @@ class BatchDrive {
     status_ = status();
   }
 
-  /// Records the poses of all agents present at the start, from now on.
+  /// Starts to record the poses of all agents that are present at the start.
   void start_recording_poses() {
     kept_slots_ = slots_where([&](size_t slot) {
       const CompiledMap& map = map_of(slot);
@@ -163,8 +163,8 @@ class BatchDrive {
     }
   }
 
-  /// Drives all steps, or, unless poses are recorded, until no agent drives any more; false after an interrupt. Calls
-  /// on_step(completed steps).
+  /// Drives all steps. If no poses are recorded, stops as soon as no agent drives any more. Returns false after an
+  /// interrupt. Calls on_step(completed steps).
   template <typename OnStep>
   bool run(Controller* driver, const OnStep& on_step) {
     const std::unique_ptr<Controller> log = pictura::make_controller("log", simulator_, 0);
@@ -200,7 +200,7 @@ class BatchDrive {
     return !drive_steps(simulator_, commands, protocol_.steps, act, {}, after_step).is_interrupted;
   }
 
-  /// Results of the driven road users in the order of tracks, by scene of the batch.
+  /// Returns the results of the driven road users, [scenes of the batch][driven], in the order of tracks.
   std::vector<std::vector<SceneAgent>> results() const {
     const AgentStateView state = simulator_.state();
     const auto num_slots = static_cast<size_t>(simulator_.num_slots());
@@ -277,7 +277,7 @@ class BatchDrive {
     return host_copy(Span<const AgentStatus>(simulator_.state().status, roles_.size()), device());
   }
 
-  /// Removes agents, which remain absent unless they are commanded to follow the recording.
+  /// Removes agents. They remain absent unless a command makes them follow the recording.
   void remove_agents(const std::vector<int32_t>& slots) {
     if (slots.empty()) return;
     const DeviceCopy<int32_t> chosen(slots, device());
@@ -310,7 +310,7 @@ class BatchDrive {
     simulator_.set_state(array_of(chosen, shape, device()), fields);
   }
 
-  /// Measures the step that led to episode step `step`.
+  /// Updates driven steps and displacements after the simulator has reached episode step `step`.
   void measure(int step) {
     const std::vector<AgentStatus> before = std::exchange(status_, status());
     std::vector<AgentBox> boxes;
@@ -332,7 +332,8 @@ class BatchDrive {
     }
   }
 
-  /// Records poses after a step of the episode, and before the first step; absent agents keep their last pose.
+  /// Records the current poses as those after step `step`. Absent agents keep their last pose. Called with step 0 also
+  /// before the first step, so that every agent has a last pose.
   void record_poses(int step) {
     const std::vector<AgentBox> boxes = host_copy(simulator_.scene().agents, device());
     const auto steps = static_cast<size_t>(protocol_.steps), at = static_cast<size_t>(step);
@@ -351,20 +352,20 @@ class BatchDrive {
   double density_;
   int rollout_;
   Simulator& simulator_;
-  std::vector<SceneRole> roles_;         // [slots], as the members below
+  std::vector<SceneRole> roles_;         // [slots], as are the next members
   std::vector<int32_t> takeover_steps_;  // episode step
   std::vector<int32_t> world_of_slot_, track_of_slot_;
   std::vector<int32_t> last_steps_;  // last recorded episode step
   std::vector<AgentStatus> status_;  // after the last step
   std::vector<Displacement> displacements_;
   std::vector<int32_t> driven_steps_;
-  std::vector<int32_t> kept_slots_;    // slots whose poses are recorded
-  std::vector<float> rises_m_;         // [kept_slots] height of the recorded box's centre above the simulated box's
+  std::vector<int32_t> kept_slots_;  // slots whose poses are recorded
+  std::vector<float> rises_m_;  // [kept_slots] height of the recorded box's centre above the simulated box's centre
   std::vector<SimulatedState> poses_;  // [kept_slots * steps]
 };
 
-/// Returns the worlds of one rollout of a batch; scene numbers count from first_scene on. All rollouts of all scenes
-/// have different world numbers, since the random draws are keyed by world number.
+/// Returns the worlds of one rollout of a batch; scene numbers count from first_scene on. Each rollout of each scene
+/// has its own world number, because random draws depend on the world number.
 std::vector<WorldSpec> worlds_of(const LoadedScenes& batch, int first_scene, int rollout, int num_rollouts) {
   std::vector<WorldSpec> worlds;
   for (size_t i = 0; i < batch.maps.size(); ++i) {
@@ -411,7 +412,8 @@ SceneIndex find_all(const SceneEvaluateOptions& options, std::string* hash_out) 
   return all;
 }
 
-/// Adds the agents of one scene of a batch to the counts of each density. agents: [drives][scenes][driven].
+/// Adds the agents of one scene of a batch to the counts of each density. agents: [drives][scenes][driven]; a drive is
+/// one rollout at one density.
 void count_agents(const std::vector<std::vector<std::vector<SceneAgent>>>& agents, size_t scene,
                   const SceneEvaluateOptions& options, SceneResults* results) {
   const auto num_rollouts = static_cast<size_t>(options.protocol.rollouts);

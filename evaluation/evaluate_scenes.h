@@ -1,4 +1,4 @@
-// Evaluation in recorded scenes: the paper's zero-shot protocol and related protocols. Has no torch headers.
+// Evaluation in recorded scenes: the paper's zero-shot protocol and related protocols. Includes no torch headers.
 #pragma once
 
 #include <functional>
@@ -14,18 +14,17 @@
 namespace pictura {
 
 struct SceneEvaluateOptions : DriverOptions {
-  std::vector<std::string> scenes;  // as find_scenes() takes them, in this order
+  std::vector<std::string> scenes;  // names of scenes for find_scenes(), evaluated in this order
   SceneProtocol protocol;
   int first_scene = 0, num_scenes = 0;  // range within the scenes found; num_scenes 0: all scenes from first_scene on
-  bool hashes_scenes = false;  // fills maps_hash of the setting, which requires reading the files of all scenes
-  int scenes_at_once = 0;      // scenes simulated together, which changes no result; 0: chosen for the device
-  // Called for every driven road user: scene by scene, density by density, rollout by rollout, in the order of the
-  // tracks.
+  bool hashes_scenes = false;           // whether to compute EvaluationSetting::maps_hash, which reads all scene files
+  int scenes_at_once = 0;  // number of scenes simulated together; changes no result; 0: chosen for the device
+  // Called for every driven road user, in the order of scenes, then densities, then rollouts, then tracks.
   std::function<void(const SceneAgent&)> on_agent;
-  // Called for every scored scene; the protocol must satisfy check_rollouts().
+  // Called for every scene that was simulated. If set, the protocol must satisfy check_rollouts().
   std::function<void(const SceneRollouts&)> on_rollouts;
-  // Name of the version by which rollouts are scored, one of realism_version_names(); the protocol must then satisfy
-  // check_rollouts(), too. Empty: rollouts are not scored.
+  // Version of the realism score: one of realism_version_names(). Empty: rollouts are not scored. If set, the protocol
+  // must satisfy check_rollouts().
   std::string realism;
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
@@ -42,8 +41,8 @@ struct SceneEvaluation {
   std::vector<std::string> faults() const;
 };
 
-/// World configuration of a protocol: `config`, an evaluation's configuration, without features that recorded scenes
-/// lack.
+/// Returns the world configuration of a protocol. It is `config`, the configuration of an evaluation, without the
+/// features that recorded scenes lack.
 SimulatorConfig protocol_config(const SceneProtocol& protocol, SimulatorConfig config);
 
 /// Evaluates a driver in recorded scenes. Scenes that cannot be read or simulated are left out and reported. Throws

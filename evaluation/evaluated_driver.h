@@ -1,4 +1,5 @@
-// Driver under evaluation, in any worlds: a saved policy or a controller, and its device. Has no torch headers.
+// Driver under evaluation: a saved policy or a controller, with its device. It drives in worlds of any kind. Includes
+// no torch headers.
 #pragma once
 
 #include <functional>
@@ -21,18 +22,18 @@ struct DriverOptions : SessionOptions {
   DriverOptions() { simulator = "auto"; }
 
   std::string checkpoint;
-  // Name of a controller of make_controller(), for instance "lane", that drives instead of the checkpoint's policy. It
-  // drives in the policy's world, or in the paper's world without a checkpoint.
+  // Controller that drives instead of the checkpoint's policy: a name known to make_controller(), for instance "lane".
+  // The world's configuration is the checkpoint's; without a checkpoint it is the paper's.
   std::string controller;
-  // Creates the controller if a program supplies its own; `controller` is then its name. The controller drives on the
-  // host and reads vectors. If the options define cameras (rig, or width_px and height_px), the controller also reads
-  // their images, drawn by its renderer, which holds the simulator's maps. Without cameras the renderer is null.
+  // Creates a controller that the calling program supplies; `controller` is then its name. The controller runs on the
+  // host and reads vector observations. If the options define cameras (rig, or width_px and height_px), the second
+  // argument is a renderer of their images that holds the simulator's maps. Without cameras it is null.
   std::function<std::unique_ptr<Controller>(const Simulator&, Renderer*)> make_own_controller;
   bool argmax = true;
   uint64_t seed = 1;
 };
 
-/// Visits the options of a driver except its name.
+/// Visits the options of a driver except `checkpoint` and `controller`.
 template <typename Visitor>
 void visit_options(DriverOptions& options, Visitor&& v) {
   v.value({"argmax"}, options.argmax);
@@ -40,22 +41,24 @@ void visit_options(DriverOptions& options, Visitor&& v) {
   visit_options(static_cast<SessionOptions&>(options), v);
 }
 
-/// Controller of the agents in a batch of worlds, and the number of agents that it drove in its last act().
+/// Controller of the agents in a batch of worlds. num_driven() returns the number of agents that the controller drove
+/// in its last act().
 struct Driving {
   std::unique_ptr<Controller> controller;
   std::function<int64_t()> num_driven;
 };
 
-/// Number of active agents in all worlds.
+/// Returns the number of active agents in all worlds.
 int64_t count_active(Simulator& simulator);
-/// Creates a controller of a session's policy in a simulator, with argmax and seed of the options. If the simulator
-/// fills auxiliary slots, a policy that was trained without them reads zeros in these slots, as in training.
+/// Creates a controller by which a session's policy drives in a simulator, with the options' argmax and seed. A policy
+/// that was trained without auxiliary slots (observed numbers that no image shows) reads zeros in these slots even if
+/// the simulator fills them.
 std::unique_ptr<PolicyController> policy_controller(PolicySession& session, Renderer* renderer,
                                                     const DriverOptions& options, const Simulator& simulator);
 
-/// Driver under evaluation. Its `drive` needs the session, renderer and options that it was created from.
+/// Driver under evaluation. The session, renderer and options from which it was created must outlive it.
 struct EvaluatedDriver {
-  SimulatorConfig world;      // world of the paper's evaluation: fixed conditioning and lights, no early end
+  SimulatorConfig world;      // the paper's evaluation world: fixed conditioning and lights, no early end of episodes
   EvaluationSetting setting;  // the driver's part of the setting
   Device device;
   std::function<Driving(Simulator&)> drive;

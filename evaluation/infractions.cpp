@@ -20,10 +20,10 @@ namespace {
 
 constexpr float kLaneChange_s = 3, kMergeAhead_m = 30;
 constexpr float kCurveRadius_m = 50;       // maximum radius of a curve
-constexpr float kJunctionTurn_rad = 0.5f;  // a lane in a junction that turns less is straight
+constexpr float kJunctionTurn_rad = 0.5f;  // minimum turn of a lane in a junction that is not straight
 constexpr float kJustRed_s = 1, kFarHead_m = 10;
 
-// Point on a lane's centre line that is nearest to a position.
+// Point of a lane's centre line that is nearest to a position.
 struct LanePlace {
   float s_m = 0;       // distance from the lane's start
   float radius_m = 0;  // radius of the line at this point, measured over 10 m to both sides
@@ -65,7 +65,7 @@ Contact contact_of(const AgentBox& own, const AgentBox& other) {
   constexpr float kCos45 = 0.70710678f;
   if (same <= -kCos45) return Contact::head_on;
   if (same < kCos45) return Contact::crossing;
-  // Whether one vehicle is behind the other along its direction; a small overlap from rounding is tolerated.
+  // One vehicle must be behind the other along the other's heading; a small overlap from rounding is tolerated.
   constexpr float kTouching_m = 0.2f;
   const float along = std::fabs(dot((other.center_m - own.center_m).xy(), other_forward));
   const float reach = 0.5f * other.length_m + half_extent(footprint(own), other_forward);
@@ -158,7 +158,7 @@ struct InfractionObserver::WorldStep {
     out->before_merge = is_before_merge(map, on, place.s_m);
   }
 
-  // Describes the nearest of the boxes that the agent collided with.
+  // Describes the nearest box with which the agent collided.
   void describe_partner(size_t agent, Infraction* out) const {
     const AgentBox &own = before.boxes[first_box + agent], &own_after = after.boxes[first_box + agent];
     float least_m = std::numeric_limits<float>::infinity();
@@ -182,7 +182,7 @@ struct InfractionObserver::WorldStep {
     }
   }
 
-  // Returns the red light whose stop line is nearest to the agent's bumper; -1: no light is red.
+  // Returns the red light whose stop line is nearest to the agent's front bumper; -1: no light is red.
   int32_t nearest_red_light(size_t agent) const {
     const Vec2 bumper = front_bumper(before.boxes[first_box + agent]);
     float least_m = std::numeric_limits<float>::infinity();

@@ -12,29 +12,32 @@
 
 namespace pictura {
 
-/// Names of impairments, in the order of Impairment: the keys of [simulator.others].
+/// Returns the names of impairments, in the order of the enum Impairment. These names are the keys of the configuration
+/// section [simulator.others].
 std::vector<std::string> impairment_names();
 
-/// Driver besides the evaluated driver: a policy, a controller, or the evaluated policy itself while impaired.
+/// One of the other drivers: a saved policy, a controller, or the evaluated driver with an impairment. An impaired
+/// agent overlooks road users or lights, or brakes for no reason.
 struct OtherDriver {
   std::string name;  // a saved policy's file, a name of town_controller_names(), or an impairment
   double share = 0;  // share of vehicles; for an impairment, share of all agents
-  Impairment impairment = Impairment::none;  // impairment of this name
+  Impairment impairment = Impairment::none;  // impairment that `name` denotes, if any
 };
 constexpr size_t kMaxOtherDrivers = 8;
 
-/// Parses texts like "lane=0.25", "models/vector.safetensors=0.5" or "blind=0.05". Throws UsageError naming a text of
-/// another form, or a share that is not above 0; also if the shares sum to 1 or more, an impairment is given twice, or
-/// there are more than kMaxOtherDrivers.
+/// Parses texts like "lane=0.25", "models/vector.safetensors=0.5" or "blind=0.05". Throws UsageError if a text has
+/// another form, a share is not above 0, the shares sum to 1 or more, an impairment is given twice, or there are more
+/// than kMaxOtherDrivers drivers.
 std::vector<OtherDriver> other_drivers(const std::vector<std::string>& texts);
 
-/// Assigns the vehicles of an evaluation's worlds to drivers. Driver 0 is the evaluated driver; the others follow in
-/// their order.
+/// Assigns the vehicles of an evaluation's worlds to drivers. Driver 0 is the evaluated driver; the other drivers
+/// follow in the order of `others`.
 class MixedTraffic {
  public:
-  /// Opens the other drivers on `device`, with argmax and seed of the options. Renderers of policies with images hold
-  /// the maps under the handles 0, 1, ... All drivers have the world's conditioning. Throws UsageError for an
-  /// impairment of observations if the evaluated driver is a controller that does not read them.
+  /// Opens the other drivers on `device`, with the options' argmax and seed. Renderers of policies that read images
+  /// hold the maps under the handles 0, 1, ... All drivers use the conditioning of the evaluation's world. Throws
+  /// UsageError if an impairment changes observations but the evaluated driver is a controller that reads no
+  /// observations.
   MixedTraffic(const std::vector<OtherDriver>& others, const DriverOptions& options, Device device,
                const CompiledMaps& maps);
   ~MixedTraffic();
@@ -47,16 +50,15 @@ class MixedTraffic {
   /// Returns the other drivers' entries in an evaluation's setting: a policy's hash or a controller's name, and the
   /// driver's share.
   std::vector<std::string> setting() const;
-  /// Returns the configuration of the world, extended by all arrays that any of the drivers reads, and by impaired
-  /// agents.
+  /// Returns `world` with all observation arrays that any driver reads, and with the shares of impaired agents.
   SimulatorConfig adapted(SimulatorConfig world) const;
 
-  /// Returns the driver of each slot, [slots], drawn from seed, global world and agent. Impaired agents, of any class,
-  /// are drawn first; then the other vehicles are assigned. Driver 0 drives all pedestrians and cyclists that are not
-  /// impaired.
+  /// Returns the driver of each agent slot, [slots]. The random draw depends on the seed, the global world number and
+  /// the agent. Impaired agents of all classes are drawn first; then the remaining vehicles are assigned to drivers.
+  /// Driver 0 drives all pedestrians and cyclists that are not impaired.
   std::vector<uint8_t> driver_of_slots(Simulator& simulator) const;
-  /// Combines `own`, which is driver 0, with the other drivers, for a simulator at the start of its episodes. This
-  /// object must outlive the result.
+  /// Returns a controller that combines `own`, the controller of driver 0, with the other drivers. The simulator must
+  /// be at the start of its episodes. This object must outlive the result.
   Driving share(Driving own, Simulator& simulator, const std::vector<uint8_t>& driver_of_slot) const;
 
  private:

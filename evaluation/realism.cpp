@@ -20,7 +20,7 @@ namespace {
 constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 constexpr double kRealismStep_s = 0.1, kRealismStepTolerance = 0.01;  // WOMD's steps are of 0.1000 to 0.1002 s
 
-constexpr double kFarthest_m = 1e6;  // maximum distance of a state from the scene's origin
+constexpr double kFarthest_m = 1e6;  // maximum distance of a state from the scene
 
 // nuPlan's bounds of comfort.
 constexpr double kMinAcceleration_mps2 = -4.05, kMaxAcceleration_mps2 = 2.40, kMaxSideways_mps2 = 4.89;
@@ -86,7 +86,7 @@ double weighted_mean(const RealismVersion& version, const RealismLikelihoods& li
   return weights > 0 ? sum / weights : kNoValue;
 }
 
-/// Whether an event happens at a step with a recorded value (1 or 0); NaN if no step has one.
+/// Returns 1 if the event happens at a step with a recorded value, else 0; NaN if no step has a recorded value.
 double has_event(Span<const double> values, Span<const double> recorded) {
   double happens = kNoValue;
   for (size_t step = 0; step < values.size(); ++step) {
@@ -109,8 +109,8 @@ std::vector<double> smoothed(Span<const double> values) {
   return out;
 }
 
-/// Whether a vehicle's motion stays within all bounds of comfort (1 or 0); NaN if the vehicle is present for too few
-/// steps.
+/// Returns 1 if a vehicle's motion stays within all bounds of comfort, else 0; NaN if the vehicle is present for too
+/// few steps.
 double is_comfortable(const RealismFeatures& features, size_t object) {
   const std::vector<double> speeds = smoothed(features.of(object, RealismFeature::speed)),
                             turn_rates = smoothed(features.of(object, RealismFeature::turn_rate)),
@@ -120,7 +120,7 @@ double is_comfortable(const RealismFeatures& features, size_t object) {
   double holds = kNoValue;
   for (size_t step = 0; step < features.num_steps(); ++step) {
     if (std::isnan(accelerations[step])) continue;
-    // A NaN breaks no bound, since comparisons with it are false.
+    // A NaN violates no bound, because comparisons with NaN are false.
     const bool breaks =
         accelerations[step] < kMinAcceleration_mps2 || accelerations[step] > kMaxAcceleration_mps2 ||
         std::abs(speeds[step] * turn_rates[step]) > kMaxSideways_mps2 || std::abs(turn_rates[step]) > kMaxTurnRate ||

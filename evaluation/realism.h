@@ -1,6 +1,6 @@
-// The realism score, which is the likelihood of recorded motion under the distribution of simulated rollouts, and other
-// measures of rollouts: displacement, events, time to collision, comfort and progress. docs/explanation/realism.md has
-// the definitions and their sources. Has no torch headers.
+// Measures of simulated rollouts of recorded scenes: realism score, displacement, events, time to collision, comfort
+// and progress. The realism score is the likelihood of the recorded motion under the distribution of the rollouts.
+// docs/explanation/realism.md has the definitions and their sources. Includes no torch headers.
 #pragma once
 
 #include <array>
@@ -22,14 +22,14 @@ namespace pictura {
 struct RealismTerm {
   double weight = 0;         // the weights of all terms sum to 1
   double low = 0, high = 0;  // values are clamped to this range
-  int bins = 0;              // histogram bins; 0: the feature is an event, which a rollout has or lacks
+  int bins = 0;              // histogram bins; 0: the feature is an event, which a rollout contains or not
   double smoothing = 0;      // added to the count of every bin
 };
 
-/// Weights and bins of the challenge of one year.
+/// Weights and bins of the Waymo Open Sim Agents Challenge of one year.
 struct RealismVersion {
   std::string name;
-  std::array<RealismTerm, kNumRealismFeatures> terms;  // by RealismFeature
+  std::array<RealismTerm, kNumRealismFeatures> terms;  // indexed by RealismFeature
 };
 const std::vector<RealismVersion>& realism_versions();
 std::vector<std::string> realism_version_names();
@@ -41,21 +41,22 @@ constexpr int32_t kRealismStart = 10, kRealismSteps = 80;
 
 using RealismLikelihoods = std::array<double, kNumRealismFeatures>;
 
-/// Results of the rollouts of one scene. A value is NaN if the scene has nothing to compute it from.
+/// Results of the rollouts of one scene. A value is NaN if the scene has no data for it.
 struct SceneRealism {
   std::string scenario_id;
   int rollouts = 0, scored = 0;  // scored: number of scored road users
-  // Likelihoods in (0, 1]. pooled: exp of the mean log-likelihood over all road users and steps. by_object: mean over
-  // road users of exp of the mean log-likelihood over the road user's steps.
+  // Likelihoods in (0, 1]. pooled: the exponential of the mean log-likelihood over all road users and steps. by_object:
+  // for each road user, the exponential of its mean log-likelihood over its steps; then the mean over road users.
   RealismLikelihoods pooled, by_object;
-  double score = 0, score_by_object = 0;  // weighted means of pooled and of by_object over features that are not NaN
-  double ade_m = 0, min_ade_m = 0;        // mean and minimum over rollouts of the mean over road users
-  // Shares of scored road users with the event: in rollouts, and in the recording.
+  double score = 0, score_by_object = 0;  // weighted means over features of pooled and by_object, without NaN
+  double ade_m = 0, min_ade_m = 0;        // mean displacement of all road users: mean and minimum over rollouts
+  // Shares of scored road users that have the event in rollouts, and in the recording.
   double collision_rate = 0, off_road_rate = 0, red_light_rate = 0;
   double recorded_collision_rate = 0, recorded_off_road_rate = 0, recorded_red_light_rate = 0;
-  // Shares over the scored vehicles of all rollouts, or of the recording: steps with a time to collision below
-  // kShortTimeToCollision_s, and vehicles within all bounds of comfort. progress: mean share of the recorded path up to
-  // its point nearest to the vehicle's final position.
+  // short_time_to_collision: share of steps with a time to collision below kShortTimeToCollision_s. comfort: share of
+  // vehicles within all bounds of comfort. Both cover the scored vehicles of all rollouts, or of the recording.
+  // progress: share of the vehicle's recorded path up to the point nearest to its final position, as a mean over
+  // vehicles.
   double short_time_to_collision = 0, recorded_short_time_to_collision = 0;
   double comfort = 0, recorded_comfort = 0;
   double progress = 0;
@@ -71,8 +72,8 @@ class RealismScene {
   explicit RealismScene(std::shared_ptr<const Scenario> scenario);
 
   const Scenario& scenario() const { return *scenario_; }
-  /// track_ids() returns the ids of the tracks that are present at kRealismStart; every rollout must contain all of
-  /// them. scored_ids() returns the ids of the tracks that are scored.
+  /// track_ids() returns the ids of the tracks that are present at kRealismStart; every rollout must contain all these
+  /// tracks. scored_ids() returns the ids of the tracks that are scored.
   std::vector<int64_t> track_ids() const;
   std::vector<int64_t> scored_ids() const;
 
@@ -86,14 +87,14 @@ class RealismScene {
 
  private:
   size_t num_poses() const { return kRealismHistory + static_cast<size_t>(kRealismSteps); }
-  /// [objects][num_poses]
+  /// Returns the poses of one rollout, [objects][num_poses].
   std::vector<RealismPose> poses_of(const SceneRollouts& rollouts, size_t rollout) const;
   RealismFeatures features_of(const std::vector<RealismPose>& poses) const;
   double progress_of(size_t object, const RealismPose& end) const;
 
   std::shared_ptr<const Scenario> scenario_;
   RealismRoad road_;
-  std::vector<int32_t> tracks_;  // tracks of the objects
+  std::vector<int32_t> tracks_;  // [objects] index of the object's track
   std::vector<RealismObject> objects_;
   std::vector<size_t> scored_;  // indices of objects
   std::vector<RealismPose> recorded_;
@@ -101,10 +102,11 @@ class RealismScene {
 };
 
 /// Returns the log-likelihoods [steps] of one road user's recorded values under the histogram of the simulated values;
-/// NaN at steps whose recorded value is NaN. Simulated NaNs are ignored; if all simulated values are NaN, so are all
-/// results.
+/// NaN at steps whose recorded value is NaN. Simulated NaNs are ignored. If all simulated values are NaN, all results
+/// are NaN.
 std::vector<double> log_likelihoods(const RealismTerm& term, Span<const double> recorded, Span<const double> simulated);
-/// Returns the log-likelihood of a recorded event, or of its absence, if `count` of `rollouts` have the event.
+/// Returns the log-likelihood that the recording contains an event (`recorded` is true) or not, if `count` of
+/// `rollouts` rollouts contain it.
 double event_log_likelihood(const RealismTerm& term, bool recorded, int count, int rollouts);
 
 /// Scores of many scenes.
@@ -112,13 +114,12 @@ struct RealismReport {
   std::string version;
   std::vector<SceneRealism> scenes;
   std::vector<std::string> faults;  // scenes that cannot be read or scored, with reasons
-  int without_rollouts = 0;         // number of scenes that are missing in the file of rollouts
-  std::vector<std::string> unused;  // scenario ids in the file of rollouts that belong to no scene
+  int without_rollouts = 0;         // number of scenes without rollouts in the file
+  std::vector<std::string> unused;  // ids of scenarios in the file that match no scene
 };
 
-/// Scores the rollouts in the file `path`. `scenes`: names of the recorded scenes, as find_scenes() takes them. Throws
-/// Error if the file cannot be read or no scene is scored. on_progress(completed fraction) is called by the calling
-/// thread.
+/// Scores the rollouts in the file `path`. `scenes`: names of the recorded scenes for find_scenes(). Throws Error if
+/// the file cannot be read or no scene is scored. on_progress(completed fraction) is called by the calling thread.
 RealismReport score_rollouts(const std::string& path, const std::vector<std::string>& scenes,
                              const RealismVersion& version, int num_threads,
                              const std::function<void(double)>& on_progress = {});
@@ -126,8 +127,8 @@ RealismReport score_rollouts(const std::string& path, const std::vector<std::str
 /// Returns the mean over the scenes in which the member or the feature is not NaN.
 Estimate mean_of(const RealismReport& report, double SceneRealism::* member);
 Estimate mean_of(const RealismReport& report, RealismFeature feature);
-/// A group of features: kinematic, interactive or map. The likelihood of a group is, in each scene, the weighted mean
-/// of the likelihoods of its features.
+/// Group of features: kinematic, interactive or map. In each scene, a group's likelihood is the weighted mean of its
+/// features' likelihoods.
 struct RealismGroup {
   const char* name;
   std::vector<RealismFeature> features;

@@ -23,7 +23,7 @@ Point operator-(Point a, Point b) { return {a.x - b.x, a.y - b.y}; }
 double dot(Point a, Point b) { return a.x * b.x + a.y * b.y; }
 double cross(Point a, Point b) { return a.x * b.y - a.y * b.x; }
 
-/// Axes and half sides of a box, reduced by the radius of its rounded corners.
+/// Box without the rounding of its corners: axes, and half sides reduced by the radius of the corners.
 struct Core {
   Point center, forward, left;
   double half_length, half_width, radius;
@@ -52,7 +52,7 @@ struct Core {
     }
     return points;
   }
-  /// Distance to a point outside.
+  /// Returns the distance to a point outside the core.
   double distance_to(Point point) const {
     const Point away = point - center;
     return std::hypot(std::max(std::abs(dot(away, forward)) - half_length, 0.0),
@@ -60,7 +60,7 @@ struct Core {
   }
 };
 
-/// An edge in the plane, with the road on its right.
+/// Road edge in the plane; the road is on its right.
 struct PlaneEdge {
   Point a, way;
   int32_t before, next;
@@ -150,8 +150,8 @@ double RealismRoad::edge_distance_m(double x_m, double y_m, double z_m) const {
   bool is_on_road = edge.has_on_road_side(place_m);
   const int32_t neighbor = t <= 0 ? edge.before : t >= 1 ? edge.next : -1;
   if (neighbor >= 0) {
-    // At a corner two edges meet. If they turn away from the road, a point on the road side of either edge is on the
-    // road. If they turn towards the road, the point must be on the road side of both edges.
+    // Two edges meet at a corner. If they turn away from the road, a point on the road side of either edge is on the
+    // road. If they turn towards the road, a point on the road must be on the road side of both edges.
     const PlaneEdge other(sides_.edges[static_cast<size_t>(neighbor)]);
     const double turn = t <= 0 ? cross(other.way, edge.way) : cross(edge.way, other.way);
     if (other.has_on_road_side(place_m) != is_on_road) is_on_road = turn > 0;

@@ -1,6 +1,6 @@
-// Features of recorded and simulated road users that the realism score compares at each step: motion, distances, time
-// to collision, road edges and red lights. docs/explanation/realism.md has the definitions and their sources. Has no
-// torch headers.
+// Features by which the realism score compares simulated with recorded road users at each step: motion, distances, time
+// to collision, road edges and red lights. docs/explanation/realism.md has the definitions and their sources. Includes
+// no torch headers.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ enum class RealismFeature : uint8_t {
   nearest_object,     // m, to the nearest other road user; negative: overlap
   collision,          // 0 or 1
   time_to_collision,  // s, to the road user that a vehicle follows; vehicles only
-  road_edge,          // m, from the box's outermost corner; positive: off the road
+  road_edge,          // m, from the road edge to the box's outermost corner; positive: off the road
   off_road,           // 0 or 1
   red_light,          // 0 or 1; vehicles only
 };
@@ -44,17 +44,18 @@ struct RealismBox {
   double x_m = 0, y_m = 0, heading_rad = 0, length_m = 0, width_m = 0;
 };
 
-/// Returns the distance in metres between two boxes whose corners have a radius of kCornerRounding times half the
-/// shorter side. If the boxes overlap, returns the negative of the smallest shift that separates them.
+/// Returns the distance in metres between two boxes with rounded corners. The radius of a box's corners is
+/// kCornerRounding times half its shorter side. If the boxes overlap, returns the negative of the smallest shift that
+/// separates them.
 double rounded_box_distance_m(const RealismBox& a, const RealismBox& b);
 constexpr double kCornerRounding = 0.7;
 
 /// Returns the seconds until `follower` reaches `leader` at constant speeds. The follower follows the leader if the
-/// leader's box is ahead in the follower's frame and overlaps the follower's laterally, and if the headings differ by
-/// at most 75 degrees (10 degrees if the overlap is below 0.5 m). gap_m_out receives the gap between both boxes along
-/// the follower's heading; infinity if the follower does not follow the leader. The result is at most
-/// kMaxTimeToCollision_s; it has this value also if the follower does not follow the leader, the gap does not close, or
-/// a speed is NaN.
+/// leader's box is ahead of the follower's box and overlaps it laterally, and if the headings differ by at most 75
+/// degrees (10 degrees if the overlap is below 0.5 m). gap_m_out receives the gap between both boxes along the
+/// follower's heading; infinity if the follower does not follow the leader. The maximum result is
+/// kMaxTimeToCollision_s. The function also returns this maximum if the follower does not follow the leader, the gap
+/// does not close, or a speed is NaN.
 double time_to_collision_s(const RealismBox& follower, double follower_mps, const RealismBox& leader, double leader_mps,
                            double* gap_m_out);
 constexpr double kMaxTimeToCollision_s = 5.0;
@@ -67,12 +68,12 @@ class RealismRoad {
   /// Returns the horizontal distance in metres from a place to the nearest road edge on the same level; positive: off
   /// the road. If no edge is within kRoadSideReach_m, returns -kRoadSideReach_m.
   double edge_distance_m(double x_m, double y_m, double z_m) const;
-  /// Returns the maximum of that distance over the four lower corners of a box.
+  /// Returns the maximum edge distance of the four lower corners of a box.
   double edge_distance_m(const RealismObject& object, const RealismPose& pose) const;
-  /// Whether the middle of a box's front crosses a stop line between two poses, in the line's direction of travel,
-  /// while the line's light is red at that step of the recording. If the box crosses several lines at once, the lights
-  /// of all must be red. A line is ignored if the box is over 2 m above or below it, or heads over 45 degrees away from
-  /// the line's direction.
+  /// Returns whether the middle of a box's front crosses a stop line between two poses, in the line's direction of
+  /// travel, while the line's light is red. The recording at `step` defines the lights. If the box crosses several
+  /// lines at once, all their lights must be red. A line is ignored if the box is over 2 m above or below it, or heads
+  /// over 45 degrees away from the line's direction.
   bool runs_red_light(const RealismObject& object, const RealismPose& from, const RealismPose& to, int32_t step) const;
 
  private:
@@ -102,14 +103,14 @@ class RealismFeatures {
   std::vector<double> values_;
 };
 
-/// Number of poses before the first step with features. The speed and acceleration at that step are computed from them.
+/// Number of poses before the first step with features. The speed and acceleration at that step depend on these poses.
 constexpr size_t kRealismHistory = 2;
 
 /// Returns derivatives [steps] by central differences over two steps of dt_s; NaN at steps with a missing neighbour.
 std::vector<double> central_differences(Span<const double> values, double dt_s, bool are_angles = false);
 
-/// Returns the features of objects[scored[i]] for each i, among all objects. poses: [objects][kRealismHistory + steps];
-/// index kRealismHistory of the second axis is step first_step of the recording.
+/// Returns the features of objects[scored[i]] for each i. Distances and times to collision consider all objects. poses:
+/// [objects][kRealismHistory + steps]; index kRealismHistory of the second axis is step first_step of the recording.
 RealismFeatures realism_features(const std::vector<RealismObject>& objects, const std::vector<size_t>& scored,
                                  Span<const RealismPose> poses, const RealismRoad& road, int32_t first_step,
                                  double dt_s);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char* kResultsFormat = "pictura evaluation 2";
 constexpr const char* kResultsFormatAtFaultAlone = "pictura evaluation 1";
-// Counts that format 1 lacks; its "infractions" are at_fault_infraction.
+// Counts that format 1 lacks. The count "infractions" of format 1 is at_fault_infraction.
 constexpr const char* kCountsOfFormat2[] = {"collision", "wall_contact", "any_infraction", "at_fault_infraction"};
 // Counts that files of format 2 may lack.
 constexpr const char* kLaterCounts[] = {"asked",        "spawned",         "entered",   "left",

@@ -59,7 +59,7 @@ EvaluationSetting setting_from(const Json& json) {
   for (size_t i = 0; i < kNumConditioning; ++i) {
     json.at("conditioning").at(kConditioningNames[i]).get_to(s.conditioning[i]);
   }
-  // The key is missing in files of versions that had only one kind of light cycles.
+  // Files of versions with only one kind of light cycles lack this key.
   s.light_cycles = light_cycles_named(json.value("light_cycles", name_of(LightCycles::phases)));
   return s;
 }

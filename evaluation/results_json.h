@@ -1,4 +1,5 @@
-// Common parts of the files from which parts of evaluations are merged.
+// JSON format that all result files of evaluations share. Results of parts of an evaluation are merged from these
+// files.
 #pragma once
 
 #include <functional>
@@ -13,7 +14,7 @@ namespace pictura {
 Json to_json(const EvaluationSetting& setting);
 EvaluationSetting setting_from(const Json& json);
 
-/// Counts of a ScenarioCounts or SceneCounts by name.
+/// Returns the counts of a ScenarioCounts or SceneCounts by name; counts_from() is the inverse.
 template <typename Counts>
 Json counts_json(const Counts& counts) {
   Json json;
@@ -27,13 +28,13 @@ Counts counts_from(const Json& json) {
   return counts;
 }
 
-/// Throws Error naming the first key whose values differ between two parts' objects, and the parts. Keys of nested
-/// objects are written as "rules.box_scale"; `within` is the prefix of all keys.
+/// Compares the JSON objects of two parts. Throws Error naming both parts and the first key with different values. Keys
+/// of nested objects are written as "rules.box_scale"; `within` is the prefix of all keys.
 void check_same(const Json& first, const std::string& first_name, const Json& other, const std::string& other_name,
                 const std::string& within = "");
 
-/// Reads a file's JSON. Throws Error naming the file unless it has one of `formats`; the first of them is the current
-/// format.
+/// Reads a file's JSON. Throws Error naming the file if its format is not in `formats`. The first of `formats` is the
+/// current format.
 Json read_results_json(const std::string& path, const std::vector<std::string>& formats);
 /// Calls parse(). Throws Error naming the file if parse() throws a JSON exception, for instance because a value is
 /// missing.

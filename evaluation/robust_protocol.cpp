@@ -38,7 +38,7 @@ Abilities abilities_of(const RobustOptions& options) {
   return {.sees_images = session.reads_images(), .reads_observations = true};
 }
 
-// Returns why the condition does not apply, or nothing if it applies.
+// Returns why the condition does not apply; an empty text if it applies.
 std::string reason_against(const RobustCondition& condition, const Abilities& abilities) {
   if (condition.camera_severity > 0 && !abilities.sees_images) return "sees no images";
   if (condition.name == "impaired" && !abilities.reads_observations) return "reads no observations";
@@ -110,7 +110,7 @@ RobustReport evaluate_robust(const RobustOptions& options) {
   evaluation.steps = kRobustSteps;
   evaluation.light_cycles = LightCycles::independent;
   evaluation.light_heads = LightHeads::as_mapped;
-  evaluation.densities = {Density::light};  // agents_per_world replaces its number
+  evaluation.densities = {Density::light};  // agents_per_world replaces its number of agents
   for (RobustRow& row : report.rows) {
     if (!applies(row)) continue;
     if (options.on_progress) evaluation.on_progress = progress_of_part(options.on_progress, finished, num_driven);

@@ -1,6 +1,6 @@
 // Robust protocol: one table of a driver's performance in generated towns, among other drivers, and with randomized
-// cameras. Everything but the driver is fixed, so that numbers of different drivers are comparable. Has no torch
-// headers.
+// cameras. The protocol fixes everything except the driver, so that results of different drivers are comparable.
+// Includes no torch headers.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,7 @@
 
 namespace pictura {
 
-constexpr const char* kRobustProtocol = "robust";  // name in commands
+constexpr const char* kRobustProtocol = "robust";  // name of the protocol in commands
 constexpr int kRobustScenarios = 24;               // per condition
 constexpr int kRobustSteps = 1200;                 // steps of 0.1 s
 constexpr uint64_t kRobustSeed = 1;
@@ -21,9 +21,9 @@ constexpr uint64_t kRobustSeed = 1;
 struct RobustCondition {
   std::string part;                 // "towns", "carla", "others" or "cameras"
   std::string name;                 // unique
-  std::vector<std::string> maps;    // as load_map() takes them
+  std::vector<std::string> maps;    // names of maps for load_map()
   int agents_per_world = 0;         // agents of all classes
-  std::vector<std::string> others;  // as other_drivers() takes them
+  std::vector<std::string> others;  // in the format of other_drivers()
   double camera_severity = 0;       // as SessionOptions::camera_severity
 };
 
@@ -34,8 +34,8 @@ const std::vector<RobustCondition>& robust_conditions();
 /// Metrics of the evaluated driver in one condition.
 struct RobustRow {
   RobustCondition condition;
-  DensityResult counts;    // has no scenarios if the condition does not apply
-  std::string not_driven;  // reason for which the condition does not apply to the driver; empty if it applies
+  DensityResult counts;    // without scenarios if the condition does not apply
+  std::string not_driven;  // why the condition does not apply to the driver; empty if it applies
 };
 
 struct RobustReport {
@@ -47,13 +47,14 @@ struct RobustReport {
 
   /// Returns the metrics of a row's scenarios.
   EvaluateRow metrics(const RobustRow& row) const;
-  /// Returns metrics by the names "towns", "others", "cameras" and "all", each over the scenarios of its part's rows;
-  /// "all" leaves out "carla", whose files users must supply. Parts that were not driven are left out.
+  /// Returns the pooled metrics of each of the parts "towns", "others" and "cameras", over all scenarios of the part's
+  /// rows. The entry "all" pools all parts except "carla", because users must supply CARLA's maps. Parts without driven
+  /// scenarios are left out.
   std::vector<std::pair<std::string, EvaluateRow>> pooled() const;
 };
 
 struct RobustOptions : DriverOptions {
-  int scenarios = kRobustScenarios;  // per condition; results of another number than the default are not comparable
+  int scenarios = kRobustScenarios;  // per condition; only results with the default number are comparable
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
 
@@ -66,10 +67,10 @@ void visit_options(RobustOptions& options, Visitor&& v) {
   v.callback({"on_progress"}, options.on_progress);
 }
 
-/// Evaluates a driver in every condition that applies to it. Conditions with randomized cameras apply to policies that
-/// read images, conditions with impaired drivers to drivers that read observations, and "carla" if the map folder holds
-/// the eight towns. Throws UsageError for a seed, camera_severity, conditioning or lights other than the protocol's;
-/// otherwise throws as evaluate() does.
+/// Evaluates a driver in every condition that applies to it. Conditions with randomized cameras apply to drivers that
+/// read images. The condition with impaired drivers applies to drivers that read observations. The condition "carla"
+/// applies if the map folder contains CARLA's towns. Throws UsageError if the options set a seed, camera_severity,
+/// conditioning or lights other than the protocol's. Otherwise throws as evaluate() does.
 RobustReport evaluate_robust(const RobustOptions& options);
 
 }  // namespace pictura

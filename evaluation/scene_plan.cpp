@@ -16,8 +16,21 @@ namespace pictura {
 
 namespace {
 
-/// Whether an agent cannot start driving from its box, because the box touches an edge, is off the road, or touches a
-/// box that is not removed.
+const RecordedState& state_of(const CompiledMap& map, size_t track, int32_t step) {
+  const MapRecord& record = map.rules.record;
+  return record.states[track * static_cast<size_t>(record.num_steps) + static_cast<size_t>(step)];
+}
+
+/// First episode step at which the track is present; -1: none.
+int32_t first_step(const CompiledMap& map, size_t track) {
+  for (int32_t step = 0; step < map.rules.record.num_steps; ++step) {
+    if (state_of(map, track, step).is_present) return step;
+  }
+  return -1;
+}
+
+/// Returns whether an agent cannot start driving from its box: the box touches an edge, is off the road, or overlaps
+/// the box of an agent that is not removed.
 bool overlaps(const MapView& map, Span<const AgentBox> boxes, const std::vector<SceneRole>& roles, size_t track) {
   const AgentBox& box = boxes[track];
   if (!fits_map(map, box)) return true;
@@ -28,7 +41,8 @@ bool overlaps(const MapView& map, Span<const AgentBox> boxes, const std::vector<
   return false;
 }
 
-/// Episode step at which each track would be taken over, ignoring overlaps and thinning, [tracks]; -1: never.
+/// Returns the episode step at which a driver would take over each track, regardless of overlaps and thinning,
+/// [tracks]; -1: never.
 std::vector<int32_t> takeovers(const CompiledMap& map, const SceneProtocol& protocol) {
   const Scenario& scene = *map.scenario;
   const MapRecord& record = map.rules.record;

@@ -1,5 +1,5 @@
-// Results of evaluated vehicles in recorded scenes: by road user, by scene, and over all scenes; and the file format
-// from which parts of an evaluation are merged. Has no torch headers.
+// Results of evaluated vehicles in recorded scenes, by road user, by scene and over all scenes, and files from which
+// parts of an evaluation are merged. Includes no torch headers.
 #pragma once
 
 #include <cstdint>
@@ -14,20 +14,20 @@
 namespace pictura {
 
 // List of counts: X(type, name in files).
-#define PICTURA_SCENE_COUNTS(X)                                      \
-  X(int64_t, vehicles)                                               \
-  X(int64_t, at_fault)                                               \
-  X(int64_t, collision)                                              \
-  X(int64_t, off_road)                                               \
-  X(int64_t, goals)         /* vehicles that arrived */              \
-  X(int64_t, infractions)   /* vehicles at fault or off the road */  \
-  X(int64_t, measured)      /* vehicles with a known displacement */ \
-  X(double, displacement_m) /* sum of their mean displacements */    \
-  X(double, distance_m)                                              \
-  X(int64_t, driven_steps) /* of all driven road users */
+#define PICTURA_SCENE_COUNTS(X)                                             \
+  X(int64_t, vehicles)                                                      \
+  X(int64_t, at_fault)                                                      \
+  X(int64_t, collision)                                                     \
+  X(int64_t, off_road)                                                      \
+  X(int64_t, goals)         /* vehicles that arrived */                     \
+  X(int64_t, infractions)   /* vehicles at fault or off the road */         \
+  X(int64_t, measured)      /* vehicles with a known displacement */        \
+  X(double, displacement_m) /* sum of these vehicles' mean displacements */ \
+  X(double, distance_m)                                                     \
+  X(int64_t, driven_steps) /* steps of all driven road users */
 
-/// Counts over the driven vehicles of all rollouts of one scene at one density. A vehicle counts once per event,
-/// however often the event happens.
+/// Counts over the driven vehicles of all rollouts of one scene at one density. An event counts once per vehicle and
+/// rollout, however often it happens.
 struct SceneCounts {
 #define X(type, name) type name = 0;
   PICTURA_SCENE_COUNTS(X)
@@ -42,11 +42,12 @@ struct SceneCounts {
   }
 };
 
-/// Counts of an evaluation in the scenes first_scene, first_scene + 1, ... of all scenes of its setting.
+/// Counts of an evaluation in num_scenes scenes of its setting, from the scene first_scene on.
 struct SceneResults {
   EvaluationSetting setting;  // `maps` holds SceneEvaluateOptions::scenes
   SceneProtocol protocol;
-  // Files and trailing parts of files without readable scenes, with reasons; of the whole input, not only this range.
+  // Unreadable files and unreadable trailing parts of files, with reasons. The list covers the whole input, not only
+  // this range of scenes.
   std::vector<std::string> unread;
   int first_scene = 0, num_scenes = 0;
   int without_drivers = 0;          // scenes left out because all of their road users are parked or absent
@@ -69,12 +70,12 @@ struct SceneAgent {
   int events = 0;  // events of the agent's episode: bits of Event
   bool arrived = false;
   float distance_m = 0;
-  // Distance from the recorded positions: mean over the steps that are recorded while the agent drives, and at the last
-  // of these steps; NaN without such steps.
+  // Distance between the driven and the recorded position: mean over all steps at which the agent drives and the
+  // recording contains it, and value at the last of these steps. NaN without such steps.
   float mean_displacement_m = std::numeric_limits<float>::quiet_NaN(), final_displacement_m = mean_displacement_m;
 };
 
-/// Adds a road user to its scene's counts, if it is a vehicle.
+/// Adds a road user to its scene's counts. Road users that are not vehicles add only their driven steps.
 void add(const SceneAgent& agent, bool is_vehicle, SceneCounts* counts_inout);
 
 /// Results of one density over vehicle episodes; intervals are over scenes.
@@ -90,21 +91,22 @@ struct SceneRow {
 SceneRow row_of(double density, const std::vector<SceneCounts>& scenes);
 /// Returns a row for each density of the protocol; empty if no scene was scored.
 std::vector<SceneRow> rows_of(const SceneResults& results);
-/// Metrics of a row with their names in files.
+/// Returns the metrics of a row, with their names in files.
 std::vector<std::pair<std::string, Estimate>> metrics_of(const SceneRow& row);
 
-/// Merges parts, which must have the same setting and protocol, and whose scenes must be contiguous and disjoint.
-/// Throws Error naming the parts, by the names given, and the difference.
+/// Merges parts of an evaluation. The parts must have equal settings and protocols; their scenes must be disjoint and
+/// together contiguous. `names`: names of the parts in errors. Throws Error naming two parts and their difference.
 SceneResults merge(const std::vector<SceneResults>& parts, const std::vector<std::string>& names);
 
-/// Writes and reads one JSON object without loss. read_scene_results() throws Error naming the file and what is
-/// missing.
+/// Write and read results as one JSON object, without loss. read_scene_results() throws Error naming the file and what
+/// is missing.
 void write_results(const std::string& path, const SceneResults& results);
 SceneResults read_scene_results(const std::string& path);
 /// Whether the file contains results of recorded scenes, rather than results of towns or other data.
 bool has_scene_results(const std::string& path);
 
-/// Lines of a CSV file, each with its newline; the first line names the columns.
+/// Return lines of the CSV file of road users, with newlines: the head with the names of columns, and the line of one
+/// road user.
 std::string scene_agents_csv_head();
 std::string csv_line(const SceneAgent& agent);
 

@@ -27,7 +27,7 @@ enum class JointScene : uint8_t { simulated_trajectories = 1 };
 enum class Trajectory : uint8_t { center_x = 2, center_y = 3, center_z = 4, heading = 5, object_id = 6 };
 constexpr uint64_t kSimAgentsSubmission = 1;
 
-/// Appends a packed field with one member of all states.
+/// Appends a packed field that contains one member of all states.
 void append_floats(Trajectory field, Span<const SimulatedState> states, float SimulatedState::* member,
                    std::string* out) {
   std::vector<float> numbers;
@@ -80,8 +80,8 @@ void read_joint_scene(std::string_view message, SceneRollouts* scene_inout) {
   const bool is_first = scene_inout->rollouts.empty();
   const auto steps = static_cast<size_t>(scene_inout->steps);
   std::vector<SimulatedState> states(scene_inout->track_ids.size() * steps), one;
-  // Index of objects by id. In the first rollout: of the objects read so far. In later rollouts: of the objects not yet
-  // read.
+  // Object id to index. In the first rollout it contains the objects read so far; in later rollouts, the objects not
+  // yet read.
   std::unordered_map<int64_t, size_t> places;
   for (size_t i = 0; i < scene_inout->track_ids.size(); ++i) places[scene_inout->track_ids[i]] = i;
   size_t count = 0;

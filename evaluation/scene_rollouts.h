@@ -1,5 +1,5 @@
 // Rollouts of recorded scenes as the Waymo Open Sim Agents Challenge defines them, and a writer and a reader of their
-// file format. realism.h scores rollouts. Has no torch headers.
+// file format. realism.h scores rollouts. Includes no torch headers.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ struct SimulatedState {
   float heading_rad = 0;  // in [-pi, pi], from x towards y
 };
 
-/// Rollouts of one scene: the states, after each step of each rollout, of every road user that is present at the
-/// protocol's start. A road user that left, or that the recording no longer contains, keeps its last state.
+/// Rollouts of one scene. They contain all road users that are present at the protocol's start, with their states after
+/// each step of each rollout. A road user that left, or that the recording no longer contains, keeps its last state.
 struct SceneRollouts {
   std::string scenario_id;
   int steps = 0;
@@ -28,23 +28,23 @@ struct SceneRollouts {
   std::vector<std::vector<SimulatedState>> rollouts;  // [rollouts][objects * steps]
 };
 
-/// Throws UsageError unless the protocol satisfies the challenge: 32 rollouts of 80 steps from step 10 on, of all road
-/// users that are present.
+/// Throws UsageError if the protocol differs from the challenge's: 32 rollouts of 80 steps from step 10 on, with all
+/// road users that are present.
 void check_rollouts(const SceneProtocol& protocol);
 
 /// Encodes a scene as a message ScenarioRollouts of the challenge's schema
-/// (waymo_open_dataset/protos/sim_agents_submission.proto, proto2). Throws Error for ids that do not fit into its
-/// int32.
+/// (waymo_open_dataset/protos/sim_agents_submission.proto, proto2). Throws Error for a track id that does not fit into
+/// the schema's int32.
 std::string encoded(const SceneRollouts& scene);
 
-/// Writer of a file with one message SimAgentsChallengeSubmission, which contains the type and the scenes of a
-/// submission but no authors. The concatenation of several files is a message of this type too.
+/// Writer of a file with one message SimAgentsChallengeSubmission. The message contains the type and the scenes of a
+/// submission, but no authors. The concatenation of several such files is also a valid message.
 class RolloutsFile {
  public:
   explicit RolloutsFile(const std::string& path);
-  /// Appends a scene. Throws Error if the message would exceed 2 GiB, which protobuf does not read.
+  /// Appends a scene. Throws Error if the message would exceed 2 GiB, because protobuf cannot read larger messages.
   void write(const SceneRollouts& scene);
-  /// Moves the file into place, see OutputFile.
+  /// Moves the complete file to its path, see OutputFile.
   void commit() { file_.commit(); }
 
  private:
@@ -70,7 +70,7 @@ class RolloutsReader {
 
  private:
   std::string path_, bytes_;
-  std::map<std::string, std::string_view> scenes_;  // messages ScenarioRollouts in bytes_
+  std::map<std::string, std::string_view> scenes_;  // by scenario id: its message ScenarioRollouts, a part of bytes_
 };
 
 }  // namespace pictura

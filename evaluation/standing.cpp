@@ -63,7 +63,7 @@ void StandingObserver::after_step(const StepResult& /*result*/) {
       ++counts.driven_steps;
       counts.reversing_steps += speed_mps < -kRest_mps;
       Progress& progress = progress_[slot];
-      // A distance smaller than before means that another agent has taken the slot.
+      // A distance smaller than before means that a new agent uses the slot.
       const float gone_m = distance_m[slot] - progress.distance_m;
       if (gone_m < 0 || gone_m > kStuckWithin_m) progress = {step_, distance_m[slot]};
 

@@ -1,4 +1,5 @@
-// Observer of standing vehicles: whether they wait at red lights without creeping, reverse, or remain stuck.
+// Observer of standing and reversing vehicles. It measures waits at red lights, creeping during these waits, reversing,
+// and vehicles that remain stuck.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +10,8 @@
 
 namespace pictura {
 
-/// Computes the StandingCounts of worlds that are driven to their end. On a device, the data that it reads are copied
-/// to the host at every step.
+/// Computes the StandingCounts of worlds that are driven to the end. If the simulator runs on a GPU, the observer
+/// copies the data that it reads to the host at every step.
 class StandingObserver final : public StepObserver {
  public:
   /// Creates an observer; the simulator's worlds must be at the start of their episodes.
@@ -19,7 +20,7 @@ class StandingObserver final : public StepObserver {
   StandingObserver(Simulator& simulator, std::vector<uint8_t> driver_of_slot, size_t num_drivers);
 
   void after_step(const StepResult& result) override;
-  /// Counts of one driver's vehicles in each world, after the last step.
+  /// Returns the counts of one driver's vehicles in each world. Call it after the last step.
   std::vector<StandingCounts> counts(size_t driver = 0) const;
 
  private:
@@ -31,9 +32,9 @@ class StandingObserver final : public StepObserver {
 
   Simulator& simulator_;
   int step_ = 0;
-  std::vector<int32_t> awaited_light_;               // [slots] light in its world; -1: none
-  std::vector<Progress> progress_;                   // [slots]
-  std::vector<uint8_t> driver_of_slot_;              // [slots]
+  std::vector<int32_t> awaited_light_;   // [slots] index in its world of the light at which the vehicle waits; -1: none
+  std::vector<Progress> progress_;       // [slots]
+  std::vector<uint8_t> driver_of_slot_;  // [slots]
   std::vector<std::vector<StandingCounts>> counts_;  // [drivers][worlds]
 };
 

@@ -11,11 +11,11 @@
 namespace pictura {
 
 struct WorldArrays {
-  std::vector<AgentStatus> status;                          // [slots]
-  std::vector<AgentClass> agent_class;                      // [slots]
-  std::vector<float> speed_mps;                             // [slots]
-  std::vector<AgentBox> boxes;                              // boxes of agents, then of parked cars, world after world
-  std::vector<LightState> lights;                           // lights of the maps' stop lines, world after world
+  std::vector<AgentStatus> status;      // [slots]
+  std::vector<AgentClass> agent_class;  // [slots]
+  std::vector<float> speed_mps;         // [slots]
+  std::vector<AgentBox> boxes;          // world after world: boxes of its agents, then of its parked cars
+  std::vector<LightState> lights;       // world after world: lights of its map's stop lines
   std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
 
   explicit WorldArrays(Simulator& simulator)

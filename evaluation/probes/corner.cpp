@@ -51,14 +51,14 @@ class CornerProbe {
   }
 
  private:
-  // Hidden state with its world.
+  // State with a hidden vehicle, and its world.
   struct Found {
     CornerState state;
     CornerScene scene;
   };
 
   void find_corners(const ProbeFrame& frame) {
-    // After later states the scene has too few steps left for a takeover.
+    // At later steps, the scene has too few steps left for a takeover.
     if (frame.step + kTakeoverSteps >= options_.worlds.steps) return;
     KeptScene kept;
     std::vector<View> views;
@@ -108,7 +108,7 @@ class CornerProbe {
     return scene;
   }
 
-  // Whether the hidden vehicle enters the junction before the takeover ends.
+  // Returns whether the hidden vehicle enters the junction within kTakeoverSteps.
   bool enters_junction(const CornerState& state) const {
     const auto map = static_cast<size_t>(state.map);
     const int32_t junction = corners_[map].at(state.approach).junction;
@@ -146,7 +146,7 @@ class CornerProbe {
     }
   }
 
-  // Returns a vehicle near the ego other than the hidden one, drawn by the seed; -1: none.
+  // Returns a random vehicle near the ego other than the hidden vehicle; -1: none. The seed determines the choice.
   int32_t draw_other_vehicle(const CornerScene& scene, const CornerState& state) const {
     std::vector<int32_t> others;
     const auto num_agents = static_cast<int32_t>(scenes_.of(state.scene).bodies.size());
@@ -222,7 +222,7 @@ class CornerProbe {
   std::vector<BlindCorners> corners_;  // [maps]
   std::vector<LineOfSight> sights_;    // [maps]
   Simulator* driven_ = nullptr;
-  std::map<std::pair<int32_t, int32_t>, std::shared_ptr<const SavedWorld>> kept_;  // by scene and step
+  std::map<std::pair<int32_t, int32_t>, std::shared_ptr<const SavedWorld>> kept_;  // key: scene and step
   std::vector<Found> hidden_;
   std::vector<CornerState> empty_;
 };

@@ -1,5 +1,6 @@
-// Blind corners (paper, "Closed-loop driving reveals occlusion-aware behavior"): how policies approach a corner from
-// which a vehicle hidden by walls comes, and similar corners from which no vehicle comes. Has no torch headers.
+// Probe of blind corners (paper, "Closed-loop driving reveals occlusion-aware behavior"). It compares how policies
+// approach two kinds of corners: walls hide a vehicle that comes from the corner, or no vehicle comes. Includes no
+// torch headers.
 #pragma once
 
 #include "pictura/evaluation/probes/corner_results.h"
@@ -15,7 +16,7 @@ struct CornerOptions : ProbeOptions {
     batch = 256;
     worlds.adds_walls = true;  // walls make the corners blind
   }
-  int64_t pairs = 200;  // total number, taken from all scenes in turn; smaller if fewer are found
+  int64_t pairs = 200;  // maximum total number, taken from all scenes in turn
   CornerSearch search;
   CornerControl control = CornerControl::none;
 };
@@ -44,17 +45,20 @@ void visit_options(CornerOptions& options, Visitor&& v) {
            options.control, kCornerControlNames);
 }
 
-/// Drives evaluation worlds as probe_removal() does, or lets options.worlds.controller drive all of them, and searches
-/// their states for egos before blind corners (find_corner_states()). A hidden state is kept if the vehicle enters the
-/// junction within kTakeoverSteps and no part of it is visible. Visibility is measured by Renderer::visibility, in the
-/// cameras of the first policy that reads images, or in the paper's cameras. States of both kinds are kept only if
-/// their scene continues for kTakeoverSteps. match_corners() forms the pairs.
-/// Each policy then drives the ego for kTakeoverSteps (TakeoverWorlds), in worlds with walls and without: from the
-/// hidden state, from the hidden state without its vehicle, and from the empty corner. `batch` pairs run at once. An
-/// interrupt ends the probe with the completed pairs. Throws UsageError if scenes cannot be shared equally, Error
-/// naming file and key for bad input.
+/// Drives evaluation worlds as probe_removal() does, or with options.worlds.controller in all worlds. Searches the
+/// states of these worlds for egos (vehicles that policies take over) before blind corners, see find_corner_states(). A
+/// state with a hidden vehicle is kept if that vehicle enters the junction within kTakeoverSteps and the ego sees no
+/// part of it. Renderer::visibility decides this, in the cameras of the first policy that reads images, or in the
+/// paper's cameras if no policy reads images. All states, with and without a hidden vehicle, are kept only if their
+/// scene lasts kTakeoverSteps more steps. match_corners() pairs states with a hidden vehicle with similar states
+/// without one.
+/// Each policy then drives the ego for kTakeoverSteps (TakeoverWorlds) from three states: the state with the hidden
+/// vehicle, this state after removal of the vehicle, and the similar state. Each run takes place in a world with walls
+/// and in a world without walls. `batch` pairs run together. An interrupt ends the probe with the completed pairs.
+/// Throws UsageError if policies cannot drive equal numbers of scenes. Throws Error naming file and key for bad input.
 CornerResults probe_corner(const CornerOptions& options);
-/// Probes open policies of one device, with their renderers and cameras; options.policies names them.
+/// Probes policies that are already open on one device, with their renderers and cameras. options.policies holds their
+/// names.
 CornerResults probe_corner(const std::vector<PolicySession*>& sessions, const CornerOptions& options);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Results of policies at blind corners: every run, means over pairs of similar corners, and their files. Has no torch
-// headers.
+// Results of policies at blind corners: every run, means over pairs of similar corners, and files of both. Includes no
+// torch headers.
 #pragma once
 
 #include <array>
@@ -14,40 +14,41 @@
 
 namespace pictura {
 
-/// Vehicle at the corner.
+/// Situation at the corner in a run.
 enum class CornerCase : uint8_t {
   hidden,   // a hidden vehicle comes
-  removed,  // the same state without the vehicle: the control
+  removed,  // the control: the same state after removal of the hidden vehicle
   empty,    // a similar state at another corner from which no vehicle comes
 };
 constexpr std::array<const char*, 3> kCornerCaseNames{"hidden", "removed", "empty"};
 constexpr size_t kCornerCases = kCornerCaseNames.size();
-constexpr std::array<const char*, 2> kWallNames{"on", "off"};  // in the order of runs
+constexpr std::array<const char*, 2> kWallNames{"on", "off"};  // with walls, without walls: the order of runs
 
-/// Vehicle that is absent in CornerCase::removed.
+/// Vehicle that is removed in CornerCase::removed.
 enum class CornerControl : uint8_t {
-  none,       // the hidden vehicle
-  permuted,   // a control: another vehicle near the ego, drawn for each pair; no vehicle if there is none
+  none,      // the hidden vehicle
+  permuted,  // a control: another vehicle near the ego, drawn at random for each pair; none if no other vehicle is near
   untrained,  // a control: the hidden vehicle, with policies of fresh weights in the same states
 };
 constexpr std::array<const char*, 3> kCornerControlNames{"none", "permuted", "untrained"};
 
-/// World at a takeover, for pictures: agents, then parked cars.
+/// World in the state in which a policy takes over the ego, for figures. Boxes of agents come first, then those of
+/// parked cars.
 struct CornerScene {
   std::vector<AgentBox> boxes;
   std::vector<AgentStatus> status;  // [boxes]
   std::vector<Vec2> user_m;         // [kTakeoverSteps + 1] position of the hidden vehicle's box
-  int32_t removed = -1;             // agent that is hidden in CornerCase::removed; -1: none
+  int32_t removed = -1;             // agent that is removed in CornerCase::removed; -1: none
 };
 
 struct CornerResults : ProbeResults {
   CornerSearch search;
   CornerControl control = CornerControl::none;
-  int64_t pairs_asked = 0, hidden_found = 0, empty_found = 0;  // states before matching
-  std::vector<CornerPair> pairs;                               // by scene, step, ego and user of the hidden state
-  std::vector<CornerScene> scenes_of_pairs;                    // [pairs] scene of the hidden state
-  std::vector<Takeover> takeovers;                             // [pairs, walls on and off, cases, policies]
-  CompiledMaps maps;                                           // for pictures
+  int64_t pairs_asked = 0, hidden_found = 0, empty_found = 0;  // numbers of states found, before matching
+  std::vector<CornerPair> pairs;             // ordered by scene, step, ego and user of the hidden state
+  std::vector<CornerScene> scenes_of_pairs;  // [pairs] scene of the hidden state
+  std::vector<Takeover> takeovers;           // [pairs, walls on and off, cases, policies]
+  CompiledMaps maps;                         // for figures
 
   const Takeover& takeover(size_t pair, bool walls, CornerCase its_case, size_t policy) const {
     return takeovers[((pair * 2 + (walls ? 0 : 1)) * kCornerCases + static_cast<size_t>(its_case)) * policies.size() +
@@ -55,22 +56,23 @@ struct CornerResults : ProbeResults {
   }
 };
 
-/// Reveal of a run: the time at which the line of sight opens to the hidden vehicle, or to its place if it is removed.
-/// At an empty corner, the reveal has the time of the same policy's reveal from the pair's hidden state.
+/// Reveal of a run: the step at which the ego's line of sight to the hidden vehicle opens, or to the place where the
+/// vehicle would be if it was not removed. At an empty corner, the reveal is at the step of the same policy's reveal in
+/// the run from the pair's hidden state.
 struct Reveal {
   int32_t step = 0;
-  std::optional<float> distance_m;  // to the hidden vehicle, between the boxes' centres
-  float corner_m = 0;  // remaining distance to the corner's entry along the driven path; negative beyond the entry
+  std::optional<float> distance_m;  // from ego to hidden vehicle, between the boxes' centres
+  float corner_m = 0;  // remaining distance along the driven path to the corner's entry; negative beyond the entry
   float speed_mps = 0;
-  float approach_mps = 0;                  // mean speed before the reveal
+  float approach_mps = 0;                  // mean speed up to the reveal
   std::optional<float> deceleration_mps2;  // mean over the 2 s after the reveal, if the run lasts that long
 };
 /// Returns the reveal of a run; empty if the run ends before the reveal.
 std::optional<Reveal> reveal_of(const CornerResults& results, size_t pair, bool walls, CornerCase its_case,
                                 size_t policy);
 
-/// Returns the pair at whose reveal the policies' speeds differ most, in runs with walls and the hidden vehicle; the
-/// first pair if no pair has a reveal for every policy.
+/// Returns an example pair for figures: in runs with walls and the hidden vehicle, this pair has the largest difference
+/// between the policies' speeds at the reveal. Returns the first pair if no pair has a reveal for every policy.
 size_t example_of(const CornerResults& results);
 
 /// Measures of a run at the reveal, by their names in files.
@@ -78,8 +80,9 @@ struct CornerMeasures {
   Estimate distance_m, corner_m, speed_mps, approach_mps, deceleration_mps2;
 };
 
-/// Statistics of one policy's runs of a case, or of differences between two runs of each pair. A difference subtracts
-/// less_policy's run of the same case, or the same policy's run of less_case. Estimates are over scenes.
+/// Statistics of one policy's runs of a case, or of differences between two runs of each pair. The run that a
+/// difference subtracts is less_policy's run of the same case, or the same policy's run of less_case. Estimates are
+/// over scenes.
 struct CornerRow {
   bool walls = true;
   CornerCase its_case = CornerCase::hidden;
@@ -90,22 +93,23 @@ struct CornerRow {
   int scenes = 0;
   CornerMeasures at_reveal;
   // Values of single runs only:
-  int64_t ended_early = 0;                               // runs that an infraction ended
-  int64_t entered_input = 0;                             // runs in which the policy read the hidden vehicle
-  std::array<double, 3> reveal_s{};                      // 10th, 50th and 90th percentile
+  int64_t ended_early = 0;           // runs that an infraction ended
+  int64_t entered_input = 0;         // runs in which the hidden vehicle appeared in the policy's input
+  std::array<double, 3> reveal_s{};  // 10th, 50th and 90th percentile
   std::array<Estimate, kTakeoverSteps + 1> speed_mps{};  // mean over runs that have not ended
   std::array<int64_t, kTakeoverSteps + 1> driving{};     // number of runs that have not ended
 };
 
-/// Returns the rows of runs with walls, then of runs without walls. Each part has rows of every policy's cases, of the
-/// differences between each further policy and the first policy, and of each policy's differences hidden minus removed
-/// and hidden minus empty.
+/// Returns the rows of runs with walls, then of runs without walls. Each half has three kinds of rows: one row per
+/// policy and case; differences of each further policy from the first policy; and each policy's differences hidden
+/// minus removed and hidden minus empty.
 std::vector<CornerRow> summarize(const CornerResults& results);
 
-/// Writes a row for each run, with a header. Throws Error naming the path.
+/// Writes a CSV file with a header and a row for each run. Throws Error naming the path.
 void write_corner_cases(const std::string& path, const CornerResults& results);
 
-/// Results and rows as the text of one JSON object; `cases_file` is the path of the cases, and may be empty.
+/// Returns results and rows as the text of one JSON object. `cases_file` is the path of the file of cases; it may be
+/// empty.
 std::string corner_summary_json(const CornerResults& results, const std::vector<CornerRow>& rows,
                                 const std::string& cases_file);
 

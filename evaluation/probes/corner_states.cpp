@@ -17,7 +17,7 @@ Vec3 end_of(const RoadMap& map, int32_t lane) {
   return points[points.size() - 1].position_m;
 }
 
-// Returns a lane into a junction and the lanes that lead to this lane, the nearest first.
+// Returns the lane `approach` into a junction and the lanes that lead to `approach`, the nearest first.
 std::vector<int32_t> lanes_to(const RoadMap& map, int32_t approach) {
   std::vector<int32_t> lanes{approach};
   float length_m = map.lanes[approach].length_m;

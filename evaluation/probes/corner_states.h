@@ -1,5 +1,5 @@
-// States in which an ego approaches a blind corner: states in which a vehicle hidden by walls comes, and similar states
-// in which no vehicle comes. Has no torch headers.
+// Search for states in which an ego (the vehicle that policies take over) approaches a blind corner. In some of the
+// states a vehicle comes that walls hide; in similar states no vehicle comes. Includes no torch headers.
 #pragma once
 
 #include <map>
@@ -13,9 +13,9 @@ namespace pictura {
 
 struct ProbeFrame;
 
-/// Lane into a junction without traffic lights, and the lanes whose traffic crosses its path and is hidden from it by
-/// walls (find_blind_crossings()). Junctions with lights are excluded, since a light stops one of the two streams of
-/// traffic.
+/// Blind corner: a lane into a junction without traffic lights, and lanes of hidden traffic. Hidden traffic crosses the
+/// path of the first lane, and walls hide it from that lane (find_blind_crossings()). Junctions with lights are
+/// excluded, because a light stops one of the two streams of traffic.
 struct BlindCorner {
   int32_t junction = -1;
   Vec3 entry_m;  // end of the lane
@@ -24,7 +24,8 @@ struct BlindCorner {
   std::map<int32_t, Vec3> lanes;
 };
 constexpr float kCornerLead_m = 60;
-/// Blind corners by lane: every lane within kCornerLead_m before the junction that leads to a corner has an entry.
+/// Blind corners by the ego's lane. Every lane that leads to a corner and is at most kCornerLead_m before its junction
+/// has an entry.
 using BlindCorners = std::map<int32_t, BlindCorner>;
 BlindCorners find_blind_corners(const RoadMap& map, Span<const WallFace> walls);
 
@@ -37,17 +38,17 @@ struct CornerSearch {
 
 /// State of an ego before a blind corner. Agents are numbered in their world.
 struct CornerState {
-  int32_t scene = 0, map = 0, driver = 0;  // number of its scenario; indices of its map and driver
+  int32_t scene = 0, map = 0, driver = 0;  // number of the scenario; indices of its map and driver
   int32_t step = 0;                        // steps done in the scenario
   int32_t ego = 0, approach = -1;          // approach: the ego's lane
   int32_t user = -1;                       // hidden vehicle; -1: none comes
-  float distance_m = 0, speed_mps = 0;     // distance of the ego from the entry, and its speed
-  View view;                               // view of the ego, with the indices of its frame
+  float distance_m = 0, speed_mps = 0;     // the ego's distance from the corner's entry, and its speed
+  View view;                               // view of the ego; indices in it refer to the frame of the search
 };
 
-/// Finds the states in one world of a frame. A state has a hidden vehicle if walls hide, from the ego's front camera
-/// `front`, a vehicle that drives in range on the corner's hidden lanes; the nearest such vehicle is used. A state is
-/// empty if no vehicle or cyclist is in range on these lanes, or in the junction.
+/// Finds the states in one world of a frame, with or without a hidden vehicle. A hidden vehicle drives in range on a
+/// lane of the corner's hidden traffic, and walls hide it from the ego's front camera `front`. If there are several,
+/// the nearest is used. A state is empty if no vehicle or cyclist is in range on these lanes or in the junction.
 std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t world, const RoadMap& map,
                                             const BlindCorners& corners, const LineOfSight& line_of_sight,
                                             const PinholeCamera& front, const CornerSearch& search);
@@ -57,9 +58,10 @@ struct CornerPair {
 };
 /// Tolerances within which two states are similar.
 constexpr float kSameDistance_m = 1, kSameSpeed_mps = 0.5f;
-/// Returns at most `count` pairs of similar states of different egos or scenes, from all scenes in turn, in the order
-/// of the hidden states. Of the states in which an ego approaches one hidden vehicle, only the first is used. Of the
-/// states in which an ego approaches an empty corner, only the most similar one is used.
+/// Returns at most `count` pairs of similar states. The two states of a pair differ in ego or scene. Pairs are taken
+/// from all scenes in turn, and returned in the order of their hidden states. If an ego approaches the same hidden
+/// vehicle in several states, only the first of these states is used. If an ego approaches the same empty corner in
+/// several states, only the most similar one is used.
 std::vector<CornerPair> match_corners(const std::vector<CornerState>& hidden, const std::vector<CornerState>& empty,
                                       int64_t count);
 

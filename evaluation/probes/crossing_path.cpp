@@ -8,7 +8,7 @@ namespace pictura {
 namespace {
 
 constexpr float kSize_m = 0.5f, kWalkingSpeed_mps = 1.4f;
-constexpr float kRadius_m = 0.36f;     // circle around a pedestrian's box at any heading
+constexpr float kRadius_m = 0.36f;     // radius of the circle around a pedestrian's box
 constexpr float kBehind_m = 0.8f;      // from the vehicle's far side to the path's origin
 constexpr float kSameGround_m = 2.5f;  // objects at a larger height difference are on another level
 constexpr float kTurns_rad[] = {radians_of(60), radians_of(90), radians_of(120)};

@@ -1,5 +1,5 @@
-// Straight paths on which a pedestrian could emerge from behind a vehicle in a frozen state, and the part of a path on
-// which the pedestrian is hidden, seen, and hidden again. Has no torch headers.
+// Straight paths on which a pedestrian could emerge from behind a vehicle in a frozen state. On the used part of a path
+// the pedestrian is hidden, then seen, then hidden again. Includes no torch headers.
 #pragma once
 
 #include <optional>
@@ -10,11 +10,13 @@
 
 namespace pictura {
 
-/// Spacing of a path's points, and the range before and after the place behind the vehicle in which a path is searched.
+/// Spacing of a path's points, and length of a path before and after its origin, which is just behind the vehicle.
 constexpr float kPathSpacing_m = 0.5f, kPathBefore_m = 10, kPathAfter_m = 40;
 constexpr int kPathOrigin = static_cast<int>(kPathBefore_m / kPathSpacing_m);
 constexpr int kPathPoints = kPathOrigin + static_cast<int>(kPathAfter_m / kPathSpacing_m) + 1;
-/// Minimum lengths of the used part: hidden, seen (and at some point almost wholly visible), and hidden again.
+/// Conditions on the used part of a path. Each hidden end must be kPathHidden_m long or longer, the seen part
+/// kPathSeen_m or longer. At some point of the seen part, the visible share of the pedestrian must be at least
+/// kPathWhole.
 constexpr float kPathHidden_m = 2, kPathSeen_m = 2, kPathWhole = 0.9f;
 /// Maximum length of each hidden end of the used part.
 constexpr float kPathEnd_m = 8;
@@ -26,25 +28,26 @@ struct CrossingPath {
   float z_m = 0;
 
   Vec2 point_m(int i) const { return origin_m + direction * (kPathSpacing_m * static_cast<float>(i - kPathOrigin)); }
-  /// The pedestrian at point i.
+  /// Returns the pedestrian at point i.
   InsertedBox pedestrian(int i, float height_m) const;
 };
 
-/// Returns six paths through the place just behind a box as seen from `eye_m`: at right angles to the line of sight,
-/// and turned by 30 degrees to either side, in both directions.
+/// Returns six paths whose origin is just behind a box, as seen from `eye_m`. They are at right angles to the line of
+/// sight, or turned from there by 30 degrees to either side; each occurs in both directions.
 std::vector<CrossingPath> paths_behind(const AgentBox& box, Vec2 eye_m);
 
-/// Whether a pedestrian could stand at each point, [kPathPoints]: the point is in no drawn box, and in no wall at its
-/// height.
+/// Returns for each point whether a pedestrian could stand there, [kPathPoints]: no drawn box and no wall on the path's
+/// level is at the point.
 std::vector<bool> free_points(const CrossingPath& path, Span<const AgentBox> boxes, Span<const WallFace> walls);
 
-/// Part of a path: hidden from begin on, seen from first_seen on, hidden again from hidden_again on, up to end.
+/// Part of a path, in indices of points. The pedestrian is hidden in [begin, first_seen), seen in [first_seen,
+/// hidden_again), and hidden again in [hidden_again, end).
 struct PathPart {
   int begin = 0, first_seen = 0, hidden_again = 0, end = 0;
 };
-/// Returns the used part of a path. visible_shares: [kPathPoints] shares by Renderer::visibility, NaN at points where a
-/// pedestrian cannot stand. The result is empty if a pedestrian at the origin is visible, or if the phases do not
-/// satisfy the constants above, for instance because a NaN cuts off a phase.
+/// Returns the used part of a path. visible_shares: [kPathPoints] visible shares of the pedestrian by
+/// Renderer::visibility, NaN at points where a pedestrian cannot stand. The result is empty if the pedestrian is
+/// visible at the origin, or if the part violates the conditions above, for instance because a NaN cuts it off.
 std::optional<PathPart> usable_part(Span<const float> visible_shares);
 
 }  // namespace pictura

@@ -1,4 +1,5 @@
-// States of all agents of driven scenes, so that agents can be replayed from a state while another agent drives.
+// Recorded states of all agents of driven scenes. From any of these states, all agents but one can be replayed while a
+// policy drives that one agent.
 #pragma once
 
 #include <map>
@@ -10,7 +11,7 @@ namespace pictura {
 
 /// State of an agent at one step.
 struct DrivenState {
-  Vec3 position_m;  // position of its reference point
+  Vec3 position_m;  // position of the agent's reference point
   float heading_rad = 0, speed_mps = 0;
   int32_t lane = -1;
   AgentStatus status = AgentStatus::absent;
@@ -19,7 +20,7 @@ struct DrivenState {
 /// States of a scene up to its last step, or up to the step at which all of its agents had halted.
 struct DrivenScene {
   WorldSpec world;
-  int driver = 0;                   // index of its driver
+  int driver = 0;                   // index of the scene's driver
   std::vector<AgentBox> bodies;     // [agents] initial boxes
   std::vector<float> ahead_m;       // [agents] distance of the box's centre ahead of the reference point
   std::vector<DrivenState> states;  // [steps, agents]

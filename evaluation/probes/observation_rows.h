@@ -10,7 +10,7 @@
 
 namespace pictura {
 
-/// Observation arrays of `count` agents, zeros at first, for the parts that a simulator observes.
+/// Observation arrays of `count` agents, for the parts that the configuration observes. They initially contain zeros.
 class ObservationRows {
  public:
   ObservationRows(int64_t count, const SimulatorConfig& config) {

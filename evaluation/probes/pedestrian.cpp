@@ -14,10 +14,11 @@ namespace pictura {
 
 namespace {
 
-// Maximum number of paths tried in one world and step, and number of tries per call, which does not change results.
+// Maximum number of paths tried in one world and step, and number of paths tried per call. The second number does not
+// change results.
 constexpr size_t kMaxTries = 48, kTriesAtOnce = 12;
-// Interval between the points of a tried path that are measured first. No part of a used path is shorter, so every part
-// has a measured point.
+// Interval between the points of a tried path that are measured first. Every phase of a usable path is at least this
+// long, so every phase contains a measured point.
 constexpr int kCoarse = 4;
 static_assert(kPathOrigin % kCoarse == 0 && kCoarse * kPathSpacing_m <= min_of(kPathHidden_m, kPathSeen_m));
 constexpr float kMinHiderDistance_m = 5, kSameHeight_m = 0.5f;
@@ -29,7 +30,7 @@ struct Candidate {
   CrossingPath path;
 };
 
-// Remaining candidates of a world.
+// State of the search in one world: its remaining candidates.
 struct Search {
   size_t world = 0;
   int64_t due = 0;
@@ -45,8 +46,8 @@ struct Trial {
   std::vector<float> shares = std::vector<float>(kPathPoints, std::numeric_limits<float>::quiet_NaN());
   float share_without_hider = 0;  // at the origin
 
-  // Whether the path may be used, as far as the points measured first show: the hider hides the origin, and beyond the
-  // origin the pedestrian is seen and then hidden again.
+  // Returns whether the path may be usable, judged by the points that are measured first. The hider must hide the
+  // pedestrian at the origin; beyond the origin, the pedestrian must be seen and then hidden again.
   bool is_promising() const {
     if (shares[kPathOrigin] != 0 || !(share_without_hider > 0)) return false;
     int i = kPathOrigin;
@@ -150,7 +151,7 @@ class PedestrianProbe {
     return Span<const AgentBox>(frame.boxes).subspan(first, end - first);
   }
 
-  // Measures the pedestrian alone on every stride-th free point, and on the origin without the hider.
+  // Measures the visibility of the pedestrian at every stride-th free point, and at the origin without the hider.
   void measure(const ProbeFrame& frame, int stride, std::vector<Trial>* trials) {
     KeptScene scene;
     std::vector<View> views;

@@ -1,5 +1,6 @@
-// Tracked pedestrian (paper, "Counterfactual probes reveal visual grounding"): responses of policies to a pedestrian
-// that emerges from behind a vehicle and is hidden again, in frozen states. Has no torch headers.
+// Probe of a tracked pedestrian (paper, "Counterfactual probes reveal visual grounding"). It measures, in frozen
+// states, responses of policies to a pedestrian that emerges from behind a vehicle and is hidden again. Includes no
+// torch headers.
 #pragma once
 
 #include "pictura/evaluation/probes/pedestrian_results.h"
@@ -10,11 +11,11 @@ namespace pictura {
 class PolicySession;
 
 struct PedestrianOptions : ProbeOptions {
-  int64_t paths = 32;        // number in all scenes together, divided evenly; smaller if fewer are found
+  int64_t paths = 32;        // maximum number in all scenes together, divided evenly among scenes
   float hider_range_m = 30;  // maximum distance of a vehicle that hides a path
   float min_speed_mps = 1;   // minimum speed of the ego, forwards
-  // Height of the inserted pedestrian, a child. Vehicles are 1.5 m high, so cameras above that height always see part
-  // of the world's own pedestrians, which are 1.7 m high.
+  // Height of the inserted pedestrian, a child. Vehicles are 1.5 m high, so they can hide a child from all cameras.
+  // They cannot hide the world's other pedestrians, which are 1.7 m high, from cameras above 1.5 m.
   float height_m = 1.2f;
   PedestrianControl control = PedestrianControl::none;
 };
@@ -32,16 +33,17 @@ void visit_options(PedestrianOptions& options, Visitor&& v) {
            options.control, kPedestrianControlNames);
 }
 
-/// Drives evaluation worlds as probe_removal() does, and searches their states for paths automatically. A path needs an
-/// active vehicle, the ego; a vehicle or parked car ahead of it within hider_range_m, the hider; and one of
-/// paths_behind() the hider. Along the path a pedestrian is wholly hidden by the hider, then seen, and then wholly
-/// hidden again (usable_part()). The pedestrian is placed on each point of the path in the otherwise unchanged state,
-/// and each policy gets its input with and without the pedestrian: for vectors Simulator::observe, for images a scene
-/// with its box. Visibility is measured, and paths are chosen, in the cameras of the first policy that reads images, or
-/// in the paper's. An interrupt ends the probe with the completed cases. Throws UsageError if scenes cannot be shared
-/// equally, Error naming file and key for bad input.
+/// Drives evaluation worlds as probe_removal() does, and searches their states for paths. A path needs an ego, which is
+/// an active vehicle, and a hider, which is a vehicle or parked car ahead of the ego within hider_range_m. The path is
+/// one of paths_behind() the hider. Along the path a pedestrian is first wholly hidden by the hider, then seen, and
+/// then wholly hidden again (usable_part()). The pedestrian is placed on each point of the path in the otherwise
+/// unchanged state. Each policy gets its input with and without the pedestrian: vectors from Simulator::observe, images
+/// from a scene with the pedestrian's box. Visibility is measured in the cameras of the first policy that reads images,
+/// or in the paper's cameras if no policy reads images. An interrupt ends the probe with the completed cases. Throws
+/// UsageError if policies cannot drive equal numbers of scenes. Throws Error naming file and key for bad input.
 PedestrianResults probe_pedestrian(const PedestrianOptions& options);
-/// Probes open policies of one device, with their renderers and cameras; options.policies names them.
+/// Probes policies that are already open on one device, with their renderers and cameras. options.policies holds their
+/// names.
 PedestrianResults probe_pedestrian(const std::vector<PolicySession*>& sessions, const PedestrianOptions& options);
 
 }  // namespace pictura

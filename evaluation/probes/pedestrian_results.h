@@ -1,5 +1,5 @@
 // Results of policies for a pedestrian that walks from behind a vehicle through a frozen state: every point, means
-// along the path, and their files. Has no torch headers.
+// along the path, and files of both. Includes no torch headers.
 #pragma once
 
 #include <array>
@@ -27,18 +27,18 @@ constexpr std::array<const char*, 3> kPathPhaseNames{"hidden", "seen", "hidden a
 
 /// Path in a frozen state. Boxes are numbered in their world: agents, then parked cars.
 struct PedestrianPath {
-  int32_t scene = 0, map = 0, driver = 0;  // number of its scenario; indices of its map and driver
+  int32_t scene = 0, map = 0, driver = 0;  // number of the scenario; indices of its map and driver
   std::array<double, 3> map_origin_m{};    // file coordinates of the map's origin
   int32_t step = 0;                        // steps done in the scenario
   int32_t ego = 0, hider = 0;              // the hider is the box behind which the path begins
   float ego_speed_mps = 0, hider_distance_m = 0;
   int32_t first_point = 0, num_points = 0;   // the path's range in PedestrianResults::points
   int32_t first_seen = 0, hidden_again = 0;  // first points of these phases, as indices within the path's range
-  // State for pictures:
+  // State for figures:
   std::vector<AgentBox> boxes;
   std::vector<AgentStatus> status;  // [boxes]
   std::vector<LightState> lights;
-  View view;  // view of the ego, with the indices of a scene of this world alone
+  View view;  // view of the ego; indices in it refer to a scene of only this world
 
   PathPhase phase_of(int32_t point) const {
     const int32_t at = point - first_point;
@@ -46,27 +46,27 @@ struct PedestrianPath {
   }
 };
 
-/// Pedestrian at one point of a path: a case.
+/// One case of the probe: the pedestrian at one point of a path.
 struct PedestrianPoint {
   int32_t path = 0;   // index of the path
   float along_m = 0;  // distance from the path's first point
   AgentBox pedestrian;
   float distance_m = 0;     // on the ground, from the ego's rear axle
-  float visible_share = 0;  // in the ego's cameras: Renderer::visibility
+  float visible_share = 0;  // in the ego's cameras, see Renderer::visibility
 };
 
 struct PedestrianResults : ProbeResults {
   int64_t paths_asked = 0;
   float hider_range_m = 0, min_speed_mps = 0, height_m = 0;
   PedestrianControl control = PedestrianControl::none;
-  std::vector<PedestrianPath> paths;    // by scene, step, ego and hider
-  std::vector<PedestrianPoint> points;  // by path, along it
-  CompiledMaps maps;                    // for pictures, as are the cameras of the first policy that reads images
+  std::vector<PedestrianPath> paths;    // ordered by scene, step, ego and hider
+  std::vector<PedestrianPoint> points;  // ordered by path, then along the path
+  CompiledMaps maps;                    // for figures, as are the cameras
   RendererConfig cameras;
 };
 
-/// Responses of one policy over all points of a phase, or over the points of all paths at one offset from the point at
-/// which the pedestrian is first seen.
+/// Mean responses of one policy: over all points of a phase, or over all paths' points at one offset. The offset is
+/// counted from the point at which the pedestrian is first seen.
 struct PedestrianRow : ResponseMeans {
   int policy = 0;
   std::optional<PathPhase> phase;
@@ -77,11 +77,12 @@ struct PedestrianRow : ResponseMeans {
 /// Returns the rows: for each policy the phases, then the offsets in ascending order.
 std::vector<PedestrianRow> summarize(const PedestrianResults& results);
 
-/// Writes a row for each point, with a header: the path and its state, the pedestrian's point, and for each policy
-/// value, d_value, p_brake and d_p_brake. Throws Error naming the path.
+/// Writes a CSV file with a header and a row for each point. The columns are the path and its state, the pedestrian's
+/// point, and for each policy value, d_value, p_brake and d_p_brake. Throws Error naming the path.
 void write_pedestrian_cases(const std::string& path, const PedestrianResults& results);
 
-/// Results and rows as the text of one JSON object; `cases_file` is the path of the cases, and may be empty.
+/// Returns results and rows as the text of one JSON object. `cases_file` is the path of the file of cases; it may be
+/// empty.
 std::string pedestrian_summary_json(const PedestrianResults& results, const std::vector<PedestrianRow>& rows,
                                     const std::string& cases_file);
 

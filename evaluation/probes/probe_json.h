@@ -1,4 +1,4 @@
-// Common parts of all probes' summaries, as JSON.
+// JSON that the summaries of all probes have in common.
 #pragma once
 
 #include "pictura/common/support/json_text.h"
@@ -10,7 +10,8 @@ namespace pictura {
 /// Adds the numbers of cases and scenes, and the estimates.
 void add_means(const ResponseMeans& means, Json* json_out);
 
-/// Returns the policies, each with the number of cases in the scenes that the policy drove. drivers: [cases].
+/// Returns the policies, each with the number of cases in scenes that the policy drove. drivers: [cases] index of the
+/// scene's driver.
 Json policies_json(const ProbeResults& results, const std::vector<int32_t>& drivers);
 
 /// Adds the worlds, their drivers and driving mode, and the duration.

@@ -1,4 +1,5 @@
-// Options of all probes: worlds, and the policies that drive and respond in them. Has no torch headers.
+// Options of all probes. In a probe, policies drive worlds, and the probe measures how policies respond to changes of
+// the worlds' states. Includes no torch headers.
 #pragma once
 
 #include <string>
@@ -13,16 +14,15 @@ struct ProbeOptions {
   ProbeOptions() {
     worlds.densities = {Density::medium};
     worlds.scenarios = 0;
-    worlds.steps = 600;  // a minute, in which most agents still drive
+    worlds.steps = 600;  // one minute; most agents still drive at its end
   }
 
-  // Worlds and devices: maps, the first of `densities` or agents_per_world, steps, argmax, seed, devices, conditioning,
-  // progress. `first_scenario` and `scenarios` select the scenes (scenarios 0: default_probe_scenes()). Each policy
-  // drives an equal number of them: the first policy the first range, and so on. The policies that respond are
-  // `policies`.
+  // Worlds, devices and progress callback. Only the first of `densities` is used. `first_scenario` and `scenarios`
+  // select the scenes (scenarios 0: default_probe_scenes()). Each policy drives an equal number of scenes: the first
+  // policy the first range, and so on. The policies are those of `policies`, not `checkpoint`.
   EvaluateOptions worlds;
   std::vector<std::string> policies;  // checkpoints or safetensors
-  int sample_steps = 10;              // interval between sampled states
+  int sample_steps = 10;              // number of steps between sampled states
   int batch = 4096;                   // cases per call, rounded up to whole passes; affects only memory and time
 };
 
@@ -44,8 +44,8 @@ void visit_options(ProbeOptions& probe, Visitor&& v) {
           probe.batch);
 }
 
-/// Number of cases in every pass through a network. A case with its road user and the same case without it have the
-/// same place in two passes, so that equal inputs give bit-identical outputs.
+/// Number of cases in every pass through a network. The input of a case with its road user and the input without the
+/// user have the same row in two passes, so that equal inputs give bit-identical outputs.
 constexpr int probe_pass(Device device) { return device.is_host() ? 256 : 2048; }
 
 /// Returns the default number of scenes: each policy drives equally many on each map, and each map has two scenes or

@@ -1,4 +1,5 @@
-// Common parts of all probes' results: policies and worlds, responses, and means over scenes. Has no torch headers.
+// Results that all probes have in common: policies and worlds, responses, and means over scenes. Includes no torch
+// headers.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +11,8 @@
 
 namespace pictura {
 
-/// Response of a policy to a state with a road user, V(o) and P(brake | o), and to the state without the user, o'.
+/// Responses of a policy to a state with a road user, and to the same state without the user. A response consists of
+/// the value and the probability of braking.
 struct PairedResponse {
   float value = 0, value_without = 0;
   float brake = 0, brake_without = 0;
@@ -21,7 +23,7 @@ struct PairedResponse {
 };
 
 struct ProbedPolicy {
-  std::string name;  // unique name of the policy's file or run
+  std::string name;  // unique; from the name of the policy's file or run
   std::string path, hash;
   bool reads_images = false;
   std::string untrained_hash;  // hash of the fresh weights that respond instead of the policy; empty: the policy itself
@@ -32,7 +34,7 @@ struct ProbedPolicy {
 };
 
 struct ProbeResults {
-  EvaluationSetting setting;  // setting of the worlds; the policy-specific parts are those of the first policy
+  EvaluationSetting setting;  // setting of the worlds; parts that depend on the policy are those of the first policy
   std::string density;
   int agents_per_world = 0;
   int first_scene = 0, scenes = 0;  // driven scenes: each policy drives an equal share, in the order of policies
@@ -51,14 +53,14 @@ struct ProbeResults {
   const PairedResponse& response(size_t one, size_t policy) const { return responses[one * policies.size() + policy]; }
 };
 
-/// Responses of one policy to cases of one kind. Estimates are over scenes: the mean over scenes of the means of their
-/// cases, with its 95 % interval; infinite without scenes.
+/// Mean responses of one policy to cases of one kind. An estimate first takes the mean over the cases of each scene,
+/// and then the mean over scenes, with its 95 % interval; both are infinite without scenes.
 struct ResponseMeans {
   int64_t cases = 0;
   int scenes = 0;  // number of scenes with cases of this kind
   Estimate abs_value_change, abs_brake_change;
   Estimate value_change, brake_change;  // signed
-  Estimate changed_share;               // share of cases in which value or probability differ in at least one bit
+  Estimate changed_share;  // share of cases in which the value or the probability differs in at least one bit
 };
 
 /// Mean over scenes of the mean of each scene's values.
@@ -91,7 +93,7 @@ class ResponseSums {
   SceneMeans abs_value_change_, abs_brake_change_, value_change_, brake_change_, changed_;
 };
 
-/// Order of `count` items by their keys.
+/// Returns the indices of `count` items in ascending order of key(index).
 template <typename Key>
 std::vector<size_t> sorted_order(size_t count, const Key& key) {
   std::vector<size_t> order(count);
@@ -100,8 +102,8 @@ std::vector<size_t> sorted_order(size_t count, const Key& key) {
   return order;
 }
 
-/// CSV fields of responses: names for the header, and values for the row of one case. Each policy has the fields value,
-/// d_value, p_brake and d_p_brake. Both texts begin with a comma.
+/// Return CSV fields of responses: their names for the header, and their values for the row of case `one`. Each policy
+/// has the fields value, d_value, p_brake and d_p_brake. Both texts begin with a comma.
 std::string response_header(const ProbeResults& results);
 std::string response_fields(const ProbeResults& results, size_t one);
 

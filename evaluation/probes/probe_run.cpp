@@ -60,7 +60,8 @@ std::string short_name(const std::string& path) {
   return stem == "checkpoint" || stem == "policy" ? absolute.parent_path().filename().string() : stem;
 }
 
-// Short names of policies; paths if short names are equal; numbered paths if paths are equal too.
+// Returns short names of policies. Policies with equal short names get their paths as names; those with equal paths get
+// numbered paths.
 std::vector<std::string> names_of(const std::vector<std::string>& paths) {
   std::vector<std::string> names;
   for (const std::string& path : paths) names.push_back(short_name(path));
@@ -151,8 +152,8 @@ int64_t CaseQuota::due(int32_t scene, int step) const {
   return (left + times_left - 1) / times_left;
 }
 
-// Worlds with the observations of one kind of policies: with or without auxiliary slots. The worlds of all kinds are
-// stepped by the same commands, so that their states are bit-identical.
+// Worlds with the observations of one kind of policies: those with auxiliary slots, or those without. The same commands
+// step the worlds of both kinds, so that their states are bit-identical.
 struct ProbeRun::ObservedWorlds {
   const SimulatorConfig config;
   std::unique_ptr<Simulator> simulator;
@@ -169,17 +170,17 @@ struct ProbeRun::Participant {
   PolicySession* session = nullptr;          // drives
   std::unique_ptr<PolicySession> untrained;  // responds instead of `session`
   std::unique_ptr<Renderer> renderer;        // renderer of the session's images, with the maps
-  ObservedWorlds* worlds = nullptr;          // worlds in which it drives and which it observes
+  ObservedWorlds* worlds = nullptr;          // worlds in which the policy drives and which it observes
 
   PolicySession& answering() const { return untrained ? *untrained : *session; }
 };
 
-// Pairs whose states and observations are kept until a call is full.
+// Pairs whose states and observations are kept until there are enough for one call.
 struct ProbeRun::Pending {
   KeptScene scene;
   std::vector<View> views, views_without;
   std::vector<VisibilityQuery> queries;
-  std::vector<size_t> asked;  // pairs whose visibility the queries measure
+  std::vector<size_t> asked;  // indices of the pairs to which `queries` belong
 };
 
 ProbeRun::ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out,
@@ -288,7 +289,7 @@ void ProbeRun::for_each_other(const F& f) {
   }
 }
 
-// Returns options of the worlds that the present driver drives, which are one of `shares` equal shares.
+// Returns the options of the worlds that the current driver drives. They are one of `shares` equal shares.
 EvaluateOptions ProbeRun::share_of_driver(int shares) {
   EvaluateOptions worlds = options_.worlds;
   worlds.densities.resize(1);
@@ -304,7 +305,7 @@ EvaluateOptions ProbeRun::share_of_driver(int shares) {
   return worlds;
 }
 
-// Drives the driver's share of the scenes.
+// Lets the current driver drive its share of the scenes.
 void ProbeRun::drive() {
   const Participant& driver = participants_[driver_];
   EvaluationWorlds shared{maps_, driver.renderer.get(), std::move(driver.worlds->simulator)};
@@ -321,7 +322,8 @@ void ProbeRun::drive() {
   if (driver_ == 0) results_.setting = report.results.setting;
 }
 
-// Drives all scenes by a controller, which reads no observations. The setting in the results is that of the policies.
+// Lets a controller drive all scenes. The controller reads no observations. The setting in the results is that of the
+// policies.
 void ProbeRun::drive_by_controller() {
   EvaluateOptions worlds = share_of_driver(1);
   worlds.device = device_.is_host() ? "cpu" : "cuda";
@@ -362,8 +364,8 @@ void ProbeRun::add(const ProbeFrame& frame, Span<const ProbePair> pairs) {
   std::vector<int32_t> hidden;
   std::vector<InsertedBox> inserted;
   for (size_t first = 0, end = 0; first < pairs.size(); first = end) {
-    // Pairs of one world. The kept world contains the inserted boxes of all of these pairs; each box is hidden from the
-    // views of the other pairs.
+    // Handles the pairs of one world. The kept world contains the inserted boxes of all these pairs; the views of a
+    // pair hide the boxes of the other pairs.
     const size_t world = pairs[first].world;
     std::vector<InsertedBox> its_inserted;
     for (end = first; end < pairs.size() && pairs[end].world == world; ++end) {

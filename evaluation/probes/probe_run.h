@@ -1,5 +1,5 @@
-// Common procedure of all probes: policies drive equal shares of scenes, sampled states are kept as one scene, and
-// batches of cases are evaluated by all policies.
+// Procedure that all probes have in common: policies drive equal shares of the scenes, sampled states are collected in
+// one scene, and all policies evaluate batches of cases.
 #pragma once
 
 #include <functional>
@@ -50,7 +50,7 @@ struct ProbeFrame {
   }
 };
 
-/// Worlds copied from frames of any steps and joined to one scene, on the host.
+/// Scene on the host whose worlds are copies from frames of any steps.
 struct KeptScene {
   std::vector<int32_t> world_begin{0}, light_begin{0}, hidden;
   std::vector<AgentBox> boxes;
@@ -59,30 +59,31 @@ struct KeptScene {
 
   /// Adds a world, followed by inserted boxes.
   void add_world(const ProbeFrame& frame, size_t world, Span<const InsertedBox> inserted = {});
-  /// Indices in this scene of two boxes of the last added world: a box of the world's frame, and the first inserted
-  /// box.
+  /// Both return an index in this scene of a box of the last added world: the box with index `box_of_frame` in the
+  /// frame, and the first inserted box.
   int32_t box_of(const ProbeFrame& frame, size_t world, int32_t box_of_frame) const {
     return box_of_frame - frame.box_begin[world] + world_begin[geometry.size() - 1];
   }
   int32_t first_inserted(const ProbeFrame& frame, size_t world) const {
     return box_of(frame, world, frame.box_begin[world + 1]);
   }
-  /// Returns the view of a slot of the last added world, without the given boxes of this scene.
+  /// Returns the view of a slot of the last added world. The view does not show the boxes `without`, which are indices
+  /// in this scene.
   View view_of(const ProbeFrame& frame, size_t world, int32_t slot, const std::vector<int32_t>& without);
 };
 
-/// Agent of a frame, in two states that differ by one box. Either hidden_box is hidden in the second state, or
+/// Agent of a frame, observed in two states that differ by one box. Either hidden_box is hidden in the second state, or
 /// `inserted` is inserted in the first state, or the states are equal.
 struct ProbePair {
   size_t world = 0;
   int32_t slot = 0;
   int32_t hidden_box = -1;
   std::optional<InsertedBox> inserted;
-  int32_t measured_box = -1;  // box whose visibility is measured; -1: none, which gives NaN
+  int32_t measured_box = -1;  // box whose visibility is measured; -1: none, and the visibility is NaN
 };
 
-/// Number of cases still to be drawn in each scene. All scenes have equally many cases, spread evenly over the scene's
-/// samples as far as enough cases are available.
+/// Number of cases still to be drawn in each scene. All scenes have equally many cases. These are spread evenly over
+/// the scene's samples if every sample offers enough cases.
 class CaseQuota {
  public:
   CaseQuota(int64_t cases, const ProbeOptions& options) : cases_(cases), options_(options) {}
@@ -95,15 +96,16 @@ class CaseQuota {
   std::map<int32_t, int64_t> taken_;
 };
 
-/// Differences between probes.
+/// Properties in which probes differ.
 struct ProbeKind {
-  // Control: policies with fresh weights, drawn from the seed, respond. The trained policies still drive.
+  // Whether policies with fresh weights, drawn from the seed, respond as a control. The trained policies still drive.
   bool untrained = false;
 };
 
 class ProbeRun final : public EvaluationObserver {
  public:
-  /// Creates a run of open sessions of one device; `options` names them. Fills in the setting in the results.
+  /// Creates a run of sessions that are open on one device; options.policies holds their names. Fills in the setting in
+  /// the results.
   ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out,
            const ProbeKind& kind);
   ~ProbeRun() override;
@@ -111,30 +113,31 @@ class ProbeRun final : public EvaluationObserver {
   /// Called before every step, with the worlds and their driver.
   using Watch = std::function<void(Simulator& simulator, int driver)>;
 
-  /// Drives all scenes: each policy drives its share, or options.worlds.controller drives all. Passes the scenes'
-  /// states to `sample` at every sample_steps steps, from the first sampled step on. Then evaluates the remaining
-  /// pairs, and returns the visibility of every pair's measured_box, in the order of add_pairs(). If `watch` is given,
-  /// states are only observed, and add_pairs() must not be called.
+  /// Drives all scenes: each policy drives its share, or options.worlds.controller drives all. Passes the worlds'
+  /// states to `sample` after every sample_steps steps. Finally evaluates the remaining pairs, and returns the
+  /// visibility of every pair's measured_box, in the order of add_pairs(). If `watch` is given, states are only
+  /// observed, and add_pairs() must not be called.
   std::vector<float> run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch = {});
 
-  /// Adds pairs of the current frame. Responses are appended to the results in this order.
+  /// Adds pairs of the current frame. Their responses are appended to the results in the order of the pairs.
   void add_pairs(const ProbeFrame& frame, Span<const ProbePair> pairs);
 
-  /// Visibilities in the cameras of the first policy that reads images, or in the paper's.
+  /// Returns visibilities in the cameras of the first policy that reads images, or in the paper's cameras if no policy
+  /// reads images.
   std::vector<float> visibility(const KeptScene& scene, const std::vector<View>& views,
                                 const std::vector<VisibilityQuery>& queries);
-  /// Visibilities in a scene in the memory of device().
+  /// Returns visibilities in a scene that is in the memory of device().
   std::vector<float> visibility(const SceneBatch& scene, const std::vector<View>& views,
                                 const std::vector<VisibilityQuery>& queries);
-  /// Renderer configuration of these cameras' images.
+  /// Returns the renderer configuration of the cameras in which visibility is measured.
   const RendererConfig& cameras() const { return cameras_; }
-  /// First camera of cameras(), in the ego's frame.
+  /// Returns the first camera of cameras(), in the ego's frame.
   const PinholeCamera& front_camera() const { return front_camera_; }
   const CompiledMaps& maps() const { return maps_; }
   Renderer& measuring() { return *measuring_; }
   Device device() const { return device_; }
-  /// Parts of a policy: the session that responds, the renderer of its images (null if it reads none), and worlds with
-  /// its observations.
+  /// Return parts of a policy: the session that responds, the renderer of its images (null if it reads none), and the
+  /// configuration of worlds with its observations.
   PolicySession& session(size_t policy) const;
   Renderer* renderer(size_t policy) const;
   SimulatorConfig world_of(size_t policy) const;
@@ -161,7 +164,7 @@ class ProbeRun final : public EvaluationObserver {
   int64_t batch_ = 0;
   const Stopwatch since_start_;
   CompiledMaps maps_;
-  std::map<bool, std::unique_ptr<ObservedWorlds>> observed_;  // by whether auxiliary slots are filled
+  std::map<bool, std::unique_ptr<ObservedWorlds>> observed_;  // key: whether auxiliary slots are filled
   std::vector<Participant> participants_;
   RendererConfig cameras_;
   PinholeCamera front_camera_;
@@ -175,7 +178,7 @@ class ProbeRun final : public EvaluationObserver {
   ProbeResults& results_;
 };
 
-/// Throws UsageError if scenes cannot be shared equally, or there is nothing to sample.
+/// Throws UsageError if policies cannot drive equal numbers of scenes, or if there is nothing to sample.
 void check_probe(const ProbeOptions& options, size_t num_policies);
 
 /// Opens options.policies, and calls `probe` with them.

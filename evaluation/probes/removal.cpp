@@ -11,7 +11,7 @@ namespace pictura {
 
 namespace {
 
-// Case, with the indices of its world and agents in a frame.
+// Case, and the indices of its world and agents in a frame.
 struct DrawnCase {
   RemovalCase facts;
   size_t world = 0;
@@ -86,7 +86,7 @@ class RemovalProbe {
     return pairs;
   }
 
-  // Draws distinct pairs of a world, and the agent that each hides.
+  // Draws distinct pairs of a world, and for each pair the agent to hide.
   void draw(const ProbeFrame& frame, const std::vector<DrawnCase>& pairs, int count,
             std::vector<DrawnCase>* out) const {
     std::vector<int> order(pairs.size());

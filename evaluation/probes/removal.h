@@ -1,6 +1,6 @@
-// Counterfactual removal (paper, "Counterfactual probes reveal visual grounding"): responses of policies to a state
-// with and without one of the state's road users, grouped by how much of that user the ego's cameras show. Has no torch
-// headers.
+// Probe of counterfactual removal (paper, "Counterfactual probes reveal visual grounding"). It measures responses of
+// policies to a state with and without one of its road users, grouped by how much of that user the ego's cameras show.
+// Includes no torch headers.
 #pragma once
 
 #include <vector>
@@ -13,7 +13,7 @@ namespace pictura {
 class PolicySession;
 
 struct RemovalOptions : ProbeOptions {
-  int64_t removals = 88'000;  // total number, equal in each scene; smaller if a scene has fewer
+  int64_t removals = 88'000;  // maximum total number, divided evenly among scenes
   float range_m = 50;         // maximum distance of the removed users
   RemovalControl control = RemovalControl::none;
 };
@@ -30,17 +30,18 @@ void visit_options(RemovalOptions& options, Visitor&& v) {
            options.control, kRemovalControlNames);
 }
 
-/// Drives evaluation worlds, which are those of evaluate() with the same numbers, in the world configuration of the
-/// first policy: its population, walls and conditioning apply to all policies. Every `sample_steps` steps it draws
-/// distinct pairs from the state: the ego, an active vehicle, and the user, another active or halted agent within
-/// range_m. Parked cars are not drawn as users.
-/// Each policy gets its input of the unchanged state, and its input with the user hidden from this ego: vectors by
-/// Simulator::observe, images by a view without the user. Each policy reads images as in its training; occlusion is
-/// measured in the cameras of the first policy that reads images, or in the paper's cameras. An interrupt ends the
-/// probe with the completed cases. Throws UsageError if scenes cannot be shared equally, Error naming file and key for
-/// bad input.
+/// Drives evaluation worlds, which equal the worlds of evaluate() with the same scenario numbers. The world
+/// configuration is that of the first policy: its population, walls and conditioning apply to all policies. Every
+/// `sample_steps` steps the probe draws distinct pairs of an ego and a user from the state. The ego is an active
+/// vehicle; the user is another active or halted agent within range_m. Parked cars are not drawn as users.
+/// Each policy gets two inputs: one of the unchanged state, and one with the user hidden from this ego. Vectors come
+/// from Simulator::observe, images from a view with or without the user. Each policy reads images as in its training.
+/// Occlusion is measured in the cameras of the first policy that reads images, or in the paper's cameras if no policy
+/// reads images. An interrupt ends the probe with the completed cases. Throws UsageError if policies cannot drive equal
+/// numbers of scenes. Throws Error naming file and key for bad input.
 RemovalResults probe_removal(const RemovalOptions& options);
-/// Probes open policies of one device, with their renderers and cameras; options.policies names them.
+/// Probes policies that are already open on one device, with their renderers and cameras. options.policies holds their
+/// names.
 RemovalResults probe_removal(const std::vector<PolicySession*>& sessions, const RemovalOptions& options);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Results of policies for removed road users: every case, means by occlusion of the user, and their files. Has no torch
-// headers.
+// Results of policies for removed road users: every case, means by occlusion of the user, and files of both. Includes
+// no torch headers.
 #pragma once
 
 #include <array>
@@ -16,17 +16,17 @@ namespace pictura {
 enum class RemovalControl : uint8_t {
   none,       // the user of the case
   nobody,     // a control: no user, so no response may change
-  permuted,   // a control: another of the ego's road users, drawn for each case; no user if there is none
+  permuted,   // a control: another road user near the ego, drawn at random for each case; none if there is no other
   untrained,  // a control: the user, with policies of fresh weights in the same states
 };
 constexpr std::array<const char*, 4> kRemovalControlNames{"none", "nobody", "permuted", "untrained"};
 
 /// Case: one road user hidden from one ego, in one state. Agents are numbered within their world.
 struct RemovalCase {
-  int32_t scene = 0, map = 0, driver = 0;  // number of its scenario; indices of its map and driver
+  int32_t scene = 0, map = 0, driver = 0;  // number of the scenario; indices of its map and driver
   int32_t step = 0;                        // steps done in the scenario
   int32_t ego = 0, user = 0;
-  int32_t hidden = -1;  // hidden agent: without a control, `user`; -1: none
+  int32_t hidden = -1;  // hidden agent; equals `user` without a control; -1: none
   AgentClass user_class = AgentClass::vehicle;
   bool user_halted = false;
   float distance_m = 0;  // on the ground, from the ego's rear axle to the centre of the user
@@ -42,7 +42,7 @@ struct RemovalResults : ProbeResults {
   int64_t removals_asked = 0;
   float range_m = 0;
   RemovalControl control = RemovalControl::none;
-  std::vector<RemovalCase> cases;  // by scene, step, ego and user, for each driver
+  std::vector<RemovalCase> cases;  // ordered by scene, step, ego and user
 };
 
 /// Group of cases by the user's occlusion and distance.
@@ -65,15 +65,16 @@ struct RemovalRow : ResponseMeans {
   double mean_occlusion = 0;  // mean over the cases; NaN outside frames
 };
 
-/// Returns the rows. Each policy has rows for all distances together, then for each distance band; each of these has a
-/// row per bin of occlusion, and last a row for users outside all frames.
+/// Returns the rows. For each policy, rows of all distances together come first, then rows of each distance band. Each
+/// of these sets has one row per bin of occlusion, and a last row for users outside all frames.
 std::vector<RemovalRow> summarize(const RemovalResults& results);
 
-/// Writes a row for each case, with a header: its data, and for each policy value, d_value, p_brake and d_p_brake.
-/// Throws Error naming the path.
+/// Writes a CSV file with a header and a row for each case. The columns are the case's data, and for each policy value,
+/// d_value, p_brake and d_p_brake. Throws Error naming the path.
 void write_removal_cases(const std::string& path, const RemovalResults& results);
 
-/// Results and rows as the text of one JSON object; `cases_file` is the path of the cases, and may be empty.
+/// Returns results and rows as the text of one JSON object. `cases_file` is the path of the file of cases; it may be
+/// empty.
 std::string removal_summary_json(const RemovalResults& results, const std::vector<RemovalRow>& rows,
                                  const std::string& cases_file);
 

@@ -19,7 +19,7 @@ namespace pictura {
 
 namespace {
 
-// Whether a box is among the partners in an ego's vector observation.
+// Returns whether a box is among the nearest road users in an ego's vector observation.
 bool is_partner(Span<const AgentBox> boxes, int32_t box, int32_t ego, Vec2 origin_m) {
   const auto nearest = nearest_boxes(
       static_cast<int>(boxes.size()), [&](int i) -> const AgentBox& { return boxes[i]; },
@@ -58,7 +58,7 @@ TakeoverWorlds::TakeoverWorlds(ProbeRun& run, const ProbeOptions& options, const
 
 TakeoverWorlds::~TakeoverWorlds() = default;
 
-// Maps with walls have the handles that the run uploaded.
+// Returns the maps' handles in renderers. Maps with walls have the handles under which the run uploaded them.
 std::vector<GeometryHandle> TakeoverWorlds::handles_of(bool walls) const {
   std::vector<GeometryHandle> handles;
   for (size_t i = 0; i < sights_.size(); ++i) {
@@ -93,7 +93,7 @@ bool TakeoverWorlds::run(const std::vector<TakeoverStart>& starts, bool walls,
   return true;
 }
 
-// Prepares worlds that the policy observes, at the takeover.
+// Prepares worlds that the policy observes, in the states at the takeover.
 TakeoverWorlds::Worlds* TakeoverWorlds::prepare(size_t policy, const std::vector<TakeoverStart>& starts, bool walls) {
   SimulatorConfig config = run_.world_of(policy);
   config.walls = walls;
@@ -128,7 +128,7 @@ TakeoverWorlds::Worlds* TakeoverWorlds::prepare(size_t policy, const std::vector
   return worlds.get();
 }
 
-// Removes the removed agents from their worlds.
+// Removes the agents TakeoverStart::removed from their worlds.
 void TakeoverWorlds::remove(Worlds* worlds, const std::vector<TakeoverStart>& starts) {
   std::vector<int32_t> slots;
   for (size_t i = 0; i < starts.size(); ++i) {
@@ -144,7 +144,7 @@ void TakeoverWorlds::remove(Worlds* worlds, const std::vector<TakeoverStart>& st
                                current_stream(device));
 }
 
-// Records the current state in runs that have not ended; false if all have ended.
+// Records the current state in runs that have not ended. Returns false if all runs have ended.
 bool TakeoverWorlds::observe_step(Worlds* worlds, size_t policy, const std::vector<TakeoverStart>& starts, int step,
                                   const std::vector<Takeover*>& runs) {
   const Device device = run_.device();

@@ -1,5 +1,5 @@
-// Takeovers: policies drive an ego from a state of a driven scene, while all other agents repeat their motion in it.
-// Has no torch headers.
+// Takeovers: a policy drives an ego from a state of a driven scene on, while all other agents repeat their motion of
+// that scene. Includes no torch headers.
 #pragma once
 
 #include <array>
@@ -21,14 +21,14 @@ struct ProbeOptions;
 constexpr int kTakeoverSteps = 80;
 constexpr double kTakeoverStep_s = 0.1;
 
-/// Number of runs in every pass through a network. Each run keeps its place in the pass, so that equal inputs give
+/// Number of runs in every pass through a network. Each run has the same row in every pass, so that equal inputs give
 /// bit-identical outputs.
 constexpr int takeover_pass(Device device) { return device.is_host() ? 8 : 256; }
 
 struct TakeoverStart {
   const DrivenScene* scene = nullptr;
-  const SavedWorld* world = nullptr;  // the scene's world, in the state in which the policy takes over
-  int32_t step = 0, ego = 0;          // steps done in the scenario at the takeover
+  const SavedWorld* world = nullptr;  // the scene's world in the state at the takeover
+  int32_t step = 0, ego = 0;          // step: steps done in the scenario at the takeover
   int32_t user = -1;                  // hidden vehicle; -1: none
   int32_t removed = -1;               // removed agent; -1: none
 };
@@ -36,10 +36,10 @@ struct TakeoverStart {
 /// One run of one policy. Element k is the value after k steps; NaN after the end of the run.
 struct Takeover {
   int32_t steps = 0;     // steps that the ego drove: kTakeoverSteps, or fewer if an infraction ended the run
-  uint8_t ended_by = 0;  // Event bits of that infraction
-  // sight_step: first step at which no wall of the map is between the ego's eye and the user, or the place of a removed
-  // user. input_step: first step at which the user is in the policy's input, that is, seen by cameras or among the
-  // nearest partners. -1: never.
+  uint8_t ended_by = 0;  // Event bits of the infraction that ended the run
+  // sight_step: first step at which no wall of the map hides the user, or the place of a removed user, from the ego's
+  // front camera. input_step: first step at which the user is in the policy's input: visible in cameras, or among the
+  // nearest road users of a vector observation. Both are -1 if there is no such step.
   int32_t sight_step = -1, input_step = -1;
   float sight_distance_m = std::numeric_limits<float>::quiet_NaN();  // at sight_step, between the boxes' centres
   std::array<float, kTakeoverSteps + 1> speed_mps, x_m, y_m;         // motion of the ego's reference point
@@ -52,16 +52,16 @@ struct Takeover {
 /// Runs takeovers in worlds of the probe's maps, with and without their walls.
 class TakeoverWorlds {
  public:
-  /// Creates the worlds after run.run(), which drives the scenes. sights: [maps]. The arguments must outlive the
+  /// Creates the worlds. run.run() must have driven the scenes before. sights: [maps]. The arguments must outlive the
   /// object.
   TakeoverWorlds(ProbeRun& run, const ProbeOptions& options, const std::vector<LineOfSight>& sights);
   ~TakeoverWorlds();
 
-  /// Runs all takeovers; takeovers_out: [starts, policies]. Each start is a separate world that continues from the kept
-  /// state, without the removed agent. All other agents are placed as in the scene, and the policy drives the ego from
-  /// its own input, with the most likely action or a draw. Sight is measured with the walls of the maps, even in worlds
-  /// without walls. on_progress receives the completed fraction, above 0. Returns false after an interrupt, when
-  /// takeovers_out must not be used.
+  /// Runs all takeovers; takeovers_out: [starts, policies]. Each start has its own world, which continues from the
+  /// state at the takeover without the removed agent. The policy drives the ego from its own input;
+  /// options.worlds.argmax decides whether it takes the most likely action or draws one. All other agents are placed as
+  /// in the scene. Sight is measured with the walls of the maps, even in worlds without walls. on_progress receives the
+  /// completed fraction, which is above 0. Returns false after an interrupt; takeovers_out must not be used then.
   bool run(const std::vector<TakeoverStart>& starts, bool walls, const std::function<void(double)>& on_progress,
            std::vector<Takeover>* takeovers_out);
 
@@ -78,7 +78,7 @@ class TakeoverWorlds {
   const ProbeOptions& options_;
   const std::vector<LineOfSight>& sights_;
   CompiledMaps open_maps_;  // maps without walls
-  // Worlds by walls and by observed parts: auxiliary slots, entities, walls.
+  // Worlds by four properties: whether they have walls, and whether they observe auxiliary slots, entities, and walls.
   std::map<std::array<bool, 4>, std::unique_ptr<Worlds>> worlds_;
 };
 
