@@ -13,8 +13,8 @@ AgentGroups group_agents(const Rollout& rollout, double adv_threshold, Communica
   const at::Tensor valid = rollout.decisions().to(at::kBool), rests = speed_mps.abs() <= kRest_mps;
   const at::Tensor is_kept = rollout.advantages.abs() >= adv_threshold;
 
-  // One copy to the host: for each group its size, the number kept, the sum of advantages, and the count of each
-  // action.
+  // A single copy to the host contains, for each group, its size, the number of kept transitions, the sum of
+  // advantages, and the count of each action.
   std::vector<at::Tensor> groups;
   for (const at::Tensor& group : {valid & rests, valid & ~rests}) {
     std::vector<at::Tensor> sums{group.sum(), (group & is_kept).sum(), (rollout.advantages * group).sum(at::kDouble)};

@@ -10,7 +10,7 @@
 
 namespace pictura {
 
-/// Valid transitions of some agents.
+/// Statistics of the valid transitions of a group of agents.
 struct AgentGroup {
   double kept_share = 0;      // share that the advantage filter keeps
   double mean_advantage = 0;  // before normalisation
@@ -18,12 +18,12 @@ struct AgentGroup {
 };
 
 struct AgentGroups {
-  double rest_share = 0;  // valid transitions of agents at rest over all
+  double rest_share = 0;  // share of valid transitions in which the agent is at rest
   AgentGroup rest, moving;
 };
 
-/// Groups the agents of all ranks' rollouts with advantages, under a filter that keeps |advantages| of at least
-/// adv_threshold. A group without agents has NaN.
+/// Groups the valid transitions of all ranks' rollouts, whose advantages must be computed already. The advantage filter
+/// keeps a transition if its |advantage| is at least adv_threshold. Values of a group without transitions are NaN.
 AgentGroups group_agents(const Rollout& rollout, double adv_threshold,
                          Communicator* communicator = single_communicator());
 

@@ -8,34 +8,35 @@
 
 namespace pictura {
 
-/// One update's part of the mean return.
+/// Contribution of one update to the mean return of recent updates.
 struct RecentUpdate {
   int64_t finished = 0;  // agent episodes that ended
   double finished_return = 0;
 };
 
 struct Checkpoint : SavedPolicy {
-  double distance_m = 0;  // driven by all agents
+  double distance_m = 0;  // distance driven by all agents
   int64_t adam_steps = 0;
-  double filter_average = -1;  // average of AdvantageFilter
+  double filter_average = -1;  // AdvantageFilter::average
   std::vector<RecentUpdate> recent;
   std::map<std::string, double> longest_update_s;          // see Run::longest_update_s
   std::vector<NamedTensor> first_moments, second_moments;  // see Optimizer
   std::vector<NamedTensor> average;                        // WeightAverage::values; empty for runs without one
-  int64_t averaged_updates = 0;                            // updates in the average
-  std::vector<uint8_t> simulator;                          // Simulator::save(), at the start of update `update`
+  int64_t averaged_updates = 0;                            // number of updates in the average
+  std::vector<uint8_t> simulator;  // result of Simulator::save() at the start of update `update`
 };
 
-/// Writes the file to a temporary file and renames it to `path`. Throws Error naming the path.
+/// Writes a temporary file and renames it to `path`. Throws Error naming the path.
 void write_checkpoint(const std::string& path, const Checkpoint& checkpoint);
 
 /// Reads a checkpoint. Throws Error naming the file if it is not a checkpoint, is truncated or damaged, or has another
-/// version, byte order or observation schema (naming the entry that differs).
+/// version or byte order. If the observation schema differs, the error also names the entry that differs.
 Checkpoint read_checkpoint(const std::string& path);
-/// Parses the bytes of a checkpoint file. Errors as for read_checkpoint().
+/// Parses the bytes of a checkpoint file. Throws as read_checkpoint() does.
 Checkpoint parse_checkpoint(const std::string& bytes, const std::string& path);
 
-/// First camera and property in which two rigs differ, with both values; empty if they are equal.
+/// Returns a text with the first camera and property in which two rigs differ, and both values. Empty if the rigs are
+/// equal.
 std::string first_difference(const Rig& saved, const Rig& now);
 
 }  // namespace pictura

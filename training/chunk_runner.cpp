@@ -22,7 +22,7 @@ void ChunkRunner::clear() {
   graphs_->release_memory();
 }
 
-// Graphs hold addresses, so values are copied there; without graphs tensors are assigned.
+// Graphs contain addresses, so values are copied to the same address. Without graphs, tensors are assigned.
 void ChunkRunner::set(at::Tensor* to, const at::Tensor& value) const {
   if (!graphs_->are_used() || !value.defined())
     *to = value;

@@ -8,7 +8,8 @@ namespace pictura {
 
 namespace {
 
-// Returns the slots to draw and encode: the active slots, or all slots if halted agents are to cost the same.
+// Returns the slots whose images are drawn and encoded: the active slots, or all slots if train.halted_slots makes
+// halted agents as expensive as active agents.
 at::Tensor seen_slots(const Run& run, const at::Tensor& active) {
   return run.config.train.halted_slots == HaltedSlots::skip ? active
                                                             : at::arange(run.rollout.num_slots(), active.options());
@@ -18,7 +19,8 @@ at::Tensor seen_slots(const Run& run, const at::Tensor& active) {
 Decision decide(Run* run, int64_t step, const at::Tensor& active) {
   const TrainSection& config = run->config.train;
   const at::Tensor rows = run->rollout.rows_of(step, seen_slots(*run, active));
-  // Products may be rounded differently in chunks of another size. Full chunks have one size, for any number of ranks.
+  // Matrix products may be rounded differently in chunks of another size. Full chunks all have one size, for any number
+  // of ranks.
   const ChunkSizes chunks{config.forward_chunk, config.reproducible};
   Decision decision = decide(rows, chunks, [run](const at::Tensor& some) { return run->chunks.act(some); });
   if (rows.size(0) > active.size(0)) {
@@ -52,7 +54,7 @@ bool Collector::collect_on_stream() {
   Simulator& simulator = *run_.simulator;
   const Stream stream = current_stream(run_.device);
   rollout.values.zero_();
-  // Latched on a device, so that no step waits.
+  // This flag stays on the device, so that no step waits for the device.
   at::Tensor are_finite = at::ones({}, rollout.values.options().dtype(at::kBool));
   for (int64_t step = 0; step < rollout.num_steps(); ++step) {
     if (run_.communicator->size() == 1 && interrupted()) return false;

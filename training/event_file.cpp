@@ -19,7 +19,7 @@ double wall_time_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-// google.protobuf.Value of a TOML value: a number, a truth value, or a text.
+// Returns the google.protobuf.Value of a TOML value: a number, a truth value, or a text.
 std::string value_of(const std::string& toml) {
   std::string value;
   if (const std::optional<double> number = parse_written_number(toml)) {
@@ -57,7 +57,7 @@ std::string text_tensor(const std::string& text) {
   return tensor;
 }
 
-// Markdown that shows a text as it stands.
+// Returns Markdown that shows a text unchanged.
 std::string as_code(const std::string& text) {
   std::string code = "    ";
   for (const char letter : text) code += letter == '\n' ? "\n    " : std::string(1, letter);

@@ -1,5 +1,5 @@
-// Scalars and configurations for TensorBoard: records of the TFRecord format (length, masked CRC-32C, data, masked
-// CRC-32C), each holding an Event message of TensorFlow's event.proto, encoded by hand.
+// Writer of scalars and configurations for TensorBoard. A file consists of TFRecord records (length, masked CRC-32C,
+// data, masked CRC-32C). Each record contains an Event message of TensorFlow's event.proto, encoded by hand.
 #pragma once
 
 #include <fstream>
@@ -23,8 +23,8 @@ class EventFile {
   explicit EventFile(const std::string& folder);
   /// Appends one event and flushes. Throws Error if the disk is full.
   void write(int64_t step, const Scalars& scalars);
-  /// Appends a run's configuration: settings that are not lists as the hyperparameters of TensorBoard's page HParams,
-  /// the whole TOML as a text. Throws Error when the disk is full.
+  /// Appends a run's configuration. Settings that are not lists become hyperparameters on TensorBoard's page HParams;
+  /// `toml` becomes a text. Throws Error if the disk is full.
   void write_configuration(const Settings& settings, const std::string& toml);
 
  private:

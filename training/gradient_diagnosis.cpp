@@ -15,7 +15,7 @@ void GradientDiagnosis::measure(const Minibatch& first, const Minibatches& minib
   const at::Tensor rows = first.rows.narrow(0, 0, minibatches.count_own_among_first(num_diagnosed));
   const at::Tensor& gradient = learner.optimizer->gradients();
   at::Tensor gradients = at::zeros({3, gradient.numel()}, gradient.options());
-  // A single chunk, or none if all transitions belong to other ranks.
+  // There is a single chunk, or none if all transitions belong to other ranks.
   for_each_chunk(rows, {config.forward_chunk}, [&](const Chunk& chunk) {
     const Losses losses = learner.runner->losses(first.part(chunk), loss);
     const PhaseTimer::Scope timed(learner.timer, Phase::diagnose);

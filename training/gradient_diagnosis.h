@@ -1,4 +1,4 @@
-// Diagnosis of an update's gradient: the share of each loss.
+// Diagnosis of an update's gradient: the norm of each loss's gradient.
 #pragma once
 
 #include "pictura/training/chunk_runner.h"
@@ -7,20 +7,20 @@ namespace pictura {
 
 struct Learner;
 
-/// Norms of the gradient by each loss alone, with its coefficient.
+/// Norms of the gradients of single losses, each multiplied by its coefficient.
 struct GradientNorms {
   double policy = 0, value = 0, entropy = 0;
 };
 
-/// Measures the gradients of single losses, for the log alone, on the first transitions of an update: so few
-/// transitions that one forward and three backward passes are at most 3 % of the update's work.
+/// Measures the gradients of single losses, only for the log, on the first transitions of an update. Their number is so
+/// small that one forward and three backward passes are at most 3 % of the update's work.
 class GradientDiagnosis {
  public:
-  /// Measures on the first of these minibatches, whose advantages are set. The parameters' gradients are 0 before and
-  /// after. Does not wait for the device.
+  /// Measures on `first`, the first of `minibatches`, whose advantages must be set. The parameters' gradients must be
+  /// 0, and are 0 again afterwards. Does not wait for the device.
   void measure(const Minibatch& first, const Minibatches& minibatches, const LossFunction& loss,
                const TrainSection& config, const Learner& learner);
-  /// Norms of all ranks. Waits for the device.
+  /// Returns the norms over all ranks. Waits for the device.
   GradientNorms norms() const;
 
  private:

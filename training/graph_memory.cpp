@@ -1,4 +1,4 @@
-// Memory of captured graphs: a private pool of torch's allocator, reached through virtual functions only, since torch's
+// Memory of captured graphs: a private pool of torch's allocator, used through virtual functions only, because torch's
 // CUDA library is not linked.
 #include "pictura/training/repeated_work.h"
 
@@ -51,7 +51,7 @@ void GraphMemory::release() {
   for (; uses_ > 0; --uses_) {
     torch_allocator()->releasePool(static_cast<c10::DeviceIndex>(device_.index), pool_of(id_));
   }
-  // Returned to the device, since renderers and simulators allocate outside torch.
+  // Returns the memory to the device, because renderers and simulators allocate outside torch.
   torch_allocator()->emptyCache(pool_of(id_));
   id_ = 0;
 }

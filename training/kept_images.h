@@ -1,4 +1,4 @@
-// Images of a rollout, kept from the step at which they are drawn to the updates that learn from them.
+// Images of a rollout, kept from the step at which they are drawn until updates have learnt from them.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,14 @@
 
 namespace pictura {
 
-/// Images of the agents that decide, stored consecutively: held actions and halted agents take no memory.
+/// Images of the agents that select a new action, stored consecutively. Agents that repeat their last action, and
+/// halted agents, take no memory.
 class KeptImages {
  public:
-  /// Allocates `capacity` images of the rig, for num_steps x num_slots rows; grows if necessary.
+  /// Allocates memory for `capacity` images of the rig, which grows if necessary. Rows are num_steps * num_slots.
   KeptImages(const Rig& rig, int64_t num_steps, int64_t num_slots, int64_t capacity, Device device);
 
-  /// Stores the images of these slots, i64 [n], at `step`: blocks of [n, cameras, ...]. Step 0 discards all previous
+  /// Stores the images of `slots`, i64 [n], at `step`. images: blocks [n, cameras, ...]. Step 0 discards all previous
   /// images.
   void put(int64_t step, const at::Tensor& slots, const std::vector<ImageBlock>& images);
   /// Returns the stored images of rows, i64 [batch] of step * num_slots + slot.

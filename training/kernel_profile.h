@@ -1,4 +1,4 @@
-// Profile of the kernels that ran on a CUDA device, by torch's profiler (CUPTI). Has no torch headers.
+// Profile of the kernels that ran on a CUDA device, by torch's profiler (CUPTI). Includes no torch headers.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +13,12 @@ struct KernelTime {
   double seconds = 0;
 };
 
-/// Profile of the work between begin() and end(), which becomes a few per cent slower. One profile at a time in a
-/// process.
+/// Profile of the work between begin() and end(). Profiling slows this work down by a few per cent. A process can have
+/// only one profile at a time.
 class KernelProfile {
  public:
   static void begin();
-  /// Kernels by descending time; empty if nothing ran on a CUDA device. Waits for the device.
+  /// Returns the kernels in the order of descending time; empty if nothing ran on a CUDA device. Waits for the device.
   static std::vector<KernelTime> end();
 };
 

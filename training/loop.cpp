@@ -35,7 +35,7 @@ namespace {
 // Loop of updates until the run is complete, out of time, or interrupted.
 class TrainingLoop {
  public:
-  /// The arguments must outlive it.
+  /// The arguments must outlive this object.
   TrainingLoop(const TrainOptions& options, Ranks* ranks, RunKeeper* keeper, RunTime* time, RunLog* log, Run* run)
       : options_(options),
         ranks_(*ranks),
@@ -67,7 +67,7 @@ class TrainingLoop {
 
   bool is_interrupted() const { return is_interrupted_; }
   bool is_out_of_time() const { return is_out_of_time_; }
-  /// Rate as of the last update.
+  /// Returns the rate up to the last update.
   double agent_steps_per_s() const { return agent_steps_per_s_; }
 
  private:
@@ -104,13 +104,13 @@ class TrainingLoop {
     return true;
   }
 
-  // Improves the policy on the rollout. Saves the minibatch of an update that fails with a number that is not finite.
+  // Improves the policy on the rollout. If the update fails because a number is not finite, saves its minibatch.
   void update_policy(UpdateRecord* record) {
     const Stopwatch watch;
     try {
       record->stats = run_.update_policy();
     } catch (const NotFinite& error) {
-      run_.communicator->step();  // throws if a rank is lost, whose numbers are meaningless
+      run_.communicator->step();  // throws if a rank is lost; numbers are then meaningless
       if (!run_.communicator->is_first()) throw;
       const std::string path = keeper_.path("failed_minibatch.safetensors");
       write_safetensors(path, error.minibatch, to_toml(run_.config));
@@ -141,7 +141,7 @@ class TrainingLoop {
     time_.scale_expected_duration(std::max(1.0, static_cast<double>(run_.image_size().pixels()) / pixels));
   }
 
-  // Evaluates if an evaluation is due. An evaluation that was interrupted, or for which there is no time, is made when
+  // Evaluates if an evaluation is due. If an evaluation is interrupted, or there is no time for it, it takes place when
   // the run resumes. All ranks evaluate at the same update.
   void evaluate_if_due() {
     if (!any_rank(evaluation_.is_due() && log_.lacks_evaluation(run_.update), run_.communicator)) return;

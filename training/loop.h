@@ -1,4 +1,4 @@
-// Training a policy by self-play, without torch headers.
+// Training of a policy by self-play. Includes no torch headers.
 #pragma once
 
 #include <functional>
@@ -15,12 +15,12 @@ namespace pictura {
 
 /// Work and time of one update.
 struct UpdateCost {
-  int64_t agent_steps = 0, slot_steps = 0;  // in its rollout
+  int64_t agent_steps = 0, slot_steps = 0;  // in the update's rollout
   double kept_fraction = 0;                 // share of valid transitions that the filter keeps
   int64_t minibatches = 0;
-  double first_kl = 0;                 // KL divergence of the first minibatch before parameters change: rounding only
-  double rollout_s = 0, update_s = 0;  // wall time of the rollout, and of the update
-  PhaseSeconds phases_s{};             // phases of both
+  double first_kl = 0;                 // KL divergence in the first minibatch before parameters change, from rounding
+  double rollout_s = 0, update_s = 0;  // wall times of the rollout and of the update
+  PhaseSeconds phases_s{};             // times of the phases of rollout and update
 };
 
 /// Progress of a run, given to on_progress after every update.
@@ -30,8 +30,8 @@ struct TrainProgress {
   double agent_steps_per_s = 0;         // since the run began or was resumed
   double recent_agent_steps_per_s = 0;  // over the last minute
   double episode_return = 0;            // mean over agent episodes that ended in the last updates; NaN before the first
-  double eta_s = 0;              // to the last update, the end of the schedule or of `minutes`, whichever comes first
-  bool ends_by_minutes = false;  // the end of `minutes` comes first: eta_s is a bound
+  double eta_s = 0;  // time to the last update, the end of the schedule or of `minutes`, whichever comes first
+  bool ends_by_minutes = false;  // whether the end of `minutes` comes first; eta_s is then an upper bound
   Scalars scalars;               // values logged for this update, as in progress.csv
   UpdateCost cost;               // cost of this update
 };
@@ -48,10 +48,10 @@ struct TrainOptions {
   std::vector<std::string> overrides;  // for instance "train.updates=2"
   std::string out_folder;
   OldRun old_run = OldRun::refuse;
-  std::string init_from;  // start with only the weights of this checkpoint or safetensors of the same network
-  double minutes = 0;     // wall-time limit, start-up included, within which the last update ends; 0: none
+  std::string init_from;  // checkpoint or safetensors of the same network that provides only initial weights
+  double minutes = 0;     // wall-time limit, start-up included; the last update ends before it; 0: none
   std::string commit;     // commit of this program, for the metadata of policy.safetensors
-  Launch launch;          // place of this process among those that train together
+  Launch launch;          // place of this process among the processes that train together
   std::function<void(const TrainProgress&)> on_progress;  // called by rank 0 only, as is on_notice
   std::function<void(const std::string&)> on_notice;      // receives messages for users that are not errors
 
@@ -61,16 +61,17 @@ struct TrainOptions {
 };
 
 struct TrainReport {
-  int64_t agent_steps = 0, updates = 0;  // over all ranks, as everything below except the device's bytes
+  // All members are over all ranks, except device_bytes and peak_tensor_bytes.
+  int64_t agent_steps = 0, updates = 0;
   double agent_steps_per_s = 0, episode_return = 0, km_driven = 0;
   int ranks = 1;
-  double evaluation_s = 0;  // time of this process in train.evaluate_every's evaluations, which no rate counts
+  double evaluation_s = 0;  // time of this process in evaluations (train.evaluate_every); rates exclude it
   bool interrupted = false, out_of_time = false;
   std::string checkpoint, policy_hash;
-  // Memory of a CUDA device, else 0. device_bytes: in use by all processes after the last update, including torch's
-  // cache; peak_tensor_bytes: peak memory of tensors.
+  // Memory of a CUDA device, else 0. device_bytes: bytes that all processes use after the last update, including
+  // torch's cache. peak_tensor_bytes: peak memory of tensors.
   int64_t device_bytes = 0, peak_tensor_bytes = 0;
-  std::string device, simulator, renderer;  // name of each; empty renderer without images
+  std::string device, simulator, renderer;  // names; `renderer` is empty without images
 };
 
 /// Error thrown if the tensors of a run do not fit into the device's memory; a smaller train.forward_chunk may fit.
@@ -84,14 +85,14 @@ class OutOfMemory : public Error {
 /// and train.milestone_agent_steps, policy.safetensors, policy_average.safetensors if train.weight_average is set,
 /// progress.csv, evaluation.csv if train.evaluate_every is set, and TensorBoard events. After an interrupt
 /// (common/support/interrupt.h) it saves and returns with `interrupted`. It returns with `out_of_time` if another
-/// update, as long as the longest update of this process, would not end within `minutes`. Before the first update, the
-/// longest update of an earlier process on a device of the same product, with as many agents, counts instead. Throws
-/// Error naming file and key for bad input. Throws Error naming the folder if another run is active in it, or if it
-/// holds a run and old_run is `refuse`. Throws OutOfMemory if the device's memory is too small.
+/// update would not end within `minutes`. The expected duration is that of the longest update of this process. Before
+/// the first update it is that of an earlier process, if that used a device of the same product and the same number of
+/// agents. Throws Error naming file and key for bad input. Throws Error naming the folder if another run is active in
+/// it, or if it holds a run and old_run is `refuse`. Throws OutOfMemory if the device's memory is too small.
 ///
 /// Several processes train one policy if each calls this function with its `launch` and equal settings. Rank 0 alone
 /// reads and writes files. An interrupt of one process ends all processes after the same update. If a rank fails, ends
-/// or hangs, throws Error naming it in all processes.
+/// or hangs, all processes throw Error naming that rank.
 TrainReport train(const TrainOptions& options);
 
 }  // namespace pictura

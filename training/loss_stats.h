@@ -9,7 +9,7 @@ namespace pictura {
 template <typename Number>
 struct LossStatsOf {
   Number policy_loss{}, value_loss{};
-  Number teacher_kl{};  // from the teacher's actions, without its weight
+  Number teacher_kl{};  // KL divergence from the teacher's actions, not multiplied by its weight
   Number entropy{}, approx_kl{}, clip_fraction{}, abs_log_ratio{};
   Number grad_norm{};  // before clipping
 
@@ -41,14 +41,14 @@ using LossStats = LossStatsOf<double>;
 using LossTensors = LossStatsOf<at::Tensor>;
 constexpr int64_t kNumLossStats = sizeof(LossStats) / sizeof(double);
 
-/// Row of the statistics of a forward pass, f64 [kNumLossStats - 1], in the order of visit_losses().
+/// Returns the statistics of a forward pass as a row, f64 [kNumLossStats - 1], in the order of visit_losses().
 inline at::Tensor stacked(const LossTensors& stats) {
   std::vector<at::Tensor> values;
   LossTensors::visit_losses(stats, [&values](const char*, const at::Tensor& value) { values.push_back(value); });
   return at::stack(values).detach().to(at::kDouble);
 }
 
-/// Elements of a row of all statistics, [kNumLossStats] in the order of visit(), as views.
+/// Returns the elements of a row of all statistics as views. The row is [kNumLossStats], in the order of visit().
 inline LossTensors elements_of(const at::Tensor& row) {
   LossTensors elements;
   int64_t i = 0;
@@ -56,7 +56,7 @@ inline LossTensors elements_of(const at::Tensor& row) {
   return elements;
 }
 
-/// Numbers of a row of all statistics, which lies on the host.
+/// Returns the numbers of a row of all statistics. The row must be on the host.
 inline LossStats numbers_of(const at::Tensor& row) {
   LossStats numbers;
   const double* next = row.const_data_ptr<double>();

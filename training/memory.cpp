@@ -18,7 +18,7 @@ namespace pictura {
 
 namespace {
 
-// Bytes of the observation of one agent at one step.
+// Returns the bytes of the observation of one agent at one step.
 double observation_bytes(const Config& config) {
   double bytes = 0;
   allocate_observations(config, 1, 1, Device{}).map([&bytes](const at::Tensor& t) {
@@ -28,7 +28,7 @@ double observation_bytes(const Config& config) {
   return bytes;
 }
 
-// Bytes of an agent's images at the largest size of the run's schedule.
+// Returns the bytes of an agent's images at the largest size of the run's schedule.
 double image_bytes(const Config& config) {
   const auto bytes_at = [&config](int64_t agent_steps) {
     return static_cast<double>(image_layout(rig_of(config, agent_steps), 1, PixelFormat::u8).bytes());
@@ -38,15 +38,15 @@ double image_bytes(const Config& config) {
   return largest;
 }
 
-// Bytes of state and its snapshot, box, view and temporaries of a step, without observations: 690 were measured on the
-// host.
+// Bytes per box in the simulator, without observations: state and its snapshot, box, view and temporaries of a step. A
+// measurement on the host gave 690.
 constexpr double kSimulatorBytesPerBox = 700;
 
 // Bytes of a transition: the scalars of a rollout (values, actions, log-probabilities, rewards, advantages, three
 // flags), and those of an update (returns, actions and five lists of rows as i64).
 constexpr double kTransitionBytes = 5 * 4 + 3 + 4 + 6 * 8;
 
-// Bytes of a map per byte of its file: above the measured values of CARLA's towns, procedural towns, and copies.
+// Bytes of a map per byte of its file. Both exceed the measured values of CARLA's towns, procedural towns, and copies.
 constexpr double kHostBytesPerFileByte = 17, kDeviceBytesPerFileByte = 11;
 
 double kept_image_bytes(const Config& config, double agents) {
@@ -65,7 +65,7 @@ double estimated_bytes(const Config& config, bool keeps_images) {
   const double agents = section.num_slots, steps = config.train.num_steps;
   const double worlds = 2 * agents / (section.min_agents + section.max_agents),
                boxes = agents + worlds * section.parked_cars;
-  // The simulator has its own observations; the rollout has those of one step more than it takes.
+  // Observations of steps + 2 steps: one step in the simulator, and steps + 1 in the rollout.
   double bytes =
       boxes * kSimulatorBytesPerBox + agents * (observation_bytes(config) * (steps + 2) + kTransitionBytes * steps);
   if (!config.train.teacher.empty()) bytes += agents * steps * kNumActions * sizeof(float);
@@ -81,15 +81,15 @@ namespace {
 // Sums the sizes of a network's layers.
 class LayerSum {
  public:
-  /// Adds a linear layer, or a convolution, of `rows` rows of `in` numbers to `out` numbers. `kept`: copies of its
-  /// results that the backward pass needs, two if an activation follows.
+  /// Adds a linear layer or a convolution that maps `rows` rows of `in` numbers to rows of `out` numbers. `kept`:
+  /// number of copies of its results that the backward pass needs; two if an activation follows.
   void add(double rows, double in, double out, double kept, double kernel_area = 1) {
     parameters_ += (in * kernel_area + 1) * out;
     add_values(rows * out, kept);
     largest_ = std::max(largest_, rows * (in + out));
   }
-  /// Adds a two-layer group. If the norm is a separate pass, the activation's input is kept beside the first layer's
-  /// results.
+  /// Adds a two-layer group. If the norm is a separate pass, the activation's input is kept in addition to the first
+  /// layer's results.
   void add_group(double rows, double in, double width, bool keeps_norm, double kept = 1) {
     add(rows, in, width, keeps_norm ? 3 : 2);
     add(rows, width, width, kept);
@@ -98,7 +98,7 @@ class LayerSum {
   void add_values(double count, double kept) { kept_ += kept * count; }
 
   double parameters() const { return parameters_; }
-  /// Numbers of a transition: what all layers keep, and the gradients at the largest layer.
+  /// Returns how many numbers a transition needs: those that all layers keep, and the gradients at the largest layer.
   double values() const { return kept_ + 2 * largest_; }
 
  private:
@@ -237,7 +237,7 @@ MapMemory estimated_map_memory(const std::vector<std::string>& names) {
 
 void check_map_memory(const Config& config, Device device, int64_t memory_bytes, int64_t host_memory_bytes,
                       int num_ranks) {
-  if (config.simulator.has_scenes()) return;  // two sets of scenes, whose sizes are known when they are loaded
+  if (config.simulator.has_scenes()) return;  // the sizes of recorded scenes are known only when they are loaded
   const std::vector<std::string> names = training_maps(config);
   const MapMemory maps = estimated_map_memory(names);
   const auto check = [&](Device where, double needed, double available) {

@@ -5,17 +5,17 @@
 
 namespace pictura {
 
-/// Whether rollouts of this number of agents keep the policy's images instead of drawing them again, as train.images
-/// specifies. With "auto" images are kept on the host, where drawing costs more than memory, and on a device if they
-/// take at most two fifths of its `memory_bytes`.
+/// Returns whether rollouts of this number of agents keep the policy's images instead of drawing them again, as
+/// train.images specifies. With "auto", the host keeps images, because drawing costs more than memory there. A GPU
+/// keeps images if they take at most two fifths of its `memory_bytes`.
 bool keeps_images(const Config& config, int num_agents, Device device, int64_t memory_bytes);
 
-/// Number of images that a rollout of num_steps keeps of an agent that is always active: none at steps where its action
-/// is held.
+/// Returns the number of images that a rollout of num_steps steps keeps of an agent that is always active. The agent
+/// selects an action every decision_steps steps; images of other steps are not kept.
 constexpr int64_t num_kept_images(int64_t num_steps, int decision_steps) { return num_steps / decision_steps + 1; }
 
-/// Estimated bytes of simulator, rollout and update for all agents of a configuration. Counts what grows with
-/// simulator.num_slots, so neither maps nor the network.
+/// Returns the estimated bytes of simulator, rollout and update for all agents of a configuration. Counts only memory
+/// that grows with simulator.num_slots, not maps or the network.
 double estimated_bytes(const Config& config, bool keeps_images);
 
 /// Size of a configuration's network. A backbone program (policy.backbone) is not counted.
@@ -25,14 +25,14 @@ struct NetworkSize {
   static constexpr double kBytesPerParameter = 20;
   /// Estimated bytes of a transition in a forward and backward pass, with the largest images of render.schedule.
   double transition_bytes = 0;
-  /// Memory for processing this number of transitions at once.
+  /// Returns the bytes needed to process this number of transitions together.
   double bytes(double transitions) const { return kBytesPerParameter * parameters + transition_bytes * transitions; }
 };
 NetworkSize network_size(const Config& config, Device device);
 
-/// Throws Error naming the responsible settings, and what would fit, if the estimates exceed `memory_bytes` of the
-/// device: for the network with a chunk of train.forward_chunk, and for the network and the agents. With several ranks
-/// the estimate is for each rank's part.
+/// Throws Error if an estimate exceeds `memory_bytes` of the device. One estimate is for the network with a chunk of
+/// train.forward_chunk, another for the network and the agents. The error names the responsible settings and numbers
+/// that would fit. With several ranks, the estimate is for the part of one rank.
 void check_memory(const Config& config, Device device, int64_t memory_bytes, int num_ranks = 1);
 
 /// Estimated bytes of maps.
@@ -40,12 +40,13 @@ struct MapMemory {
   double host = 0;    // maps as loaded, with the data for rules and renderers
   double device = 0;  // data for rules and renderers, on a device
 };
-/// Estimates the memory of these maps, named as by training_maps(), from the sizes of their files and towns. The
+/// Estimates the memory of maps from the sizes of their files and towns. names: names as in training_maps(). The
 /// estimate is rarely too small. Throws as map_file_bytes() does.
 MapMemory estimated_map_memory(const std::vector<std::string>& names);
 
-/// Throws Error if a run's maps do not fit, naming how many would fit. Maps, agents and network together must fit in
-/// `memory_bytes` of the device. If the device is not the host, the maps must also fit in `host_memory_bytes`.
+/// Throws Error if a run's maps do not fit into memory; the error gives the number of maps that would fit. Maps, agents
+/// and network together must fit in `memory_bytes` of the device. If the device is not the host, the maps must also fit
+/// in `host_memory_bytes`.
 void check_map_memory(const Config& config, Device device, int64_t memory_bytes, int64_t host_memory_bytes,
                       int num_ranks = 1);
 

@@ -16,7 +16,7 @@ Minibatch Minibatch::part(const Chunk& chunk) const {
   if (!shares.defined()) {
     result.shares = at::constant_pad_nd(at::ones({chunk.count}, advantages.options()), {0, chunk.size() - chunk.count});
   }
-  // Means are over all rows of the chunk.
+  // Means divide by all rows of the chunk, including padding rows, so weights are scaled to compensate.
   result.shares = result.shares * (static_cast<double>(chunk.size()) / static_cast<double>(chunk.count));
   return result;
 }

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kMomentum = 0.95;
 
-// Root mean square of a step's elements over the rate: about that of AdamW's steps.
+// Root mean square of a step's elements, divided by the learning rate. It is about that of AdamW's steps.
 constexpr double kStepRms = 0.2;
 
 int64_t rows_of(const at::Tensor& weight) { return weight.size(0); }
@@ -50,7 +50,8 @@ WeightRms weight_rms(const std::vector<NamedTensor>& parameters) {
 at::Tensor orthogonalized(const at::Tensor& matrices, at::ScalarType type) {
   const at::Tensor norms = at::linalg_vector_norm(matrices, 2, at::IntArrayRef{1, 2}, /*keepdim=*/true);
   at::Tensor x = (matrices / norms.clamp_min(std::numeric_limits<float>::min())).to(type);
-  // Jordan's quintic: its slope at 0 is steep, and it maps (0, 1] near 1 without converging there.
+  // Jordan's quintic polynomial. Its slope at 0 is steep. Repeated application maps (0, 1] near 1 but does not converge
+  // to 1.
   constexpr int kSteps = 5;
   constexpr double kLinear = 3.4445, kCubic = -4.775, kQuintic = 2.0315;
   for (int step = 0; step < kSteps; ++step) {
@@ -74,8 +75,8 @@ Muon::Muon(std::vector<at::Tensor> weights, at::ScalarType type, double weight_d
   index_batches();
 }
 
-// Multiplications of the products plus the launch overhead in units of multiplications. So small matrices share a
-// launch, and large matrices get little padding.
+// Returns the number of multiplications of the products, plus the overhead of launches in units of multiplications.
+// This cost makes small matrices share a launch, and large matrices get little padding.
 double Muon::Batch::cost() const {
   constexpr double kLaunches = 3e8;
   const auto side = static_cast<double>(rows);
@@ -172,9 +173,9 @@ void Muon::take_step() {
   std::vector<at::Tensor> gradients;
   for (const at::Tensor& weight : weights_) gradients.push_back(weight.grad().flatten());
   const at::Tensor gradient = at::cat(gradients), momentum = momentum_.lerp(gradient, 1 - kMomentum);
-  // Selected instead of multiplied by 0, which would keep NaN.
+  // Selects values instead of multiplying by 0, because a product of 0 and NaN is NaN.
   momentum_.copy_(at::where(has_failed, momentum_, momentum));
-  const at::Tensor direction = at::constant_pad_nd(gradient.lerp(momentum, kMomentum), {0, 1});  // Nesterov's
+  const at::Tensor direction = at::constant_pad_nd(gradient.lerp(momentum, kMomentum), {0, 1});  // Nesterov momentum
   const at::Tensor filled = direction.index_select(0, element_of_place_);
   std::vector<at::Tensor> steps;
   int64_t begin = 0;

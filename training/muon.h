@@ -1,6 +1,6 @@
-// Muon (Jordan et al., 2024): momentum whose matrices are made orthogonal before each step, for the weights of hidden
-// layers. Scaled as in Liu et al., "Muon is scalable for LLM training" (2025), so that AdamW's learning rates and
-// weight decay apply unchanged.
+// Muon (Jordan et al., 2024), an optimizer for the weights of hidden layers. It makes the momentum of each weight
+// matrix orthogonal before each step. Steps are scaled as in Liu et al., "Muon is scalable for LLM training" (2025), so
+// that AdamW's learning rates and weight decay apply unchanged.
 #pragma once
 
 #include <vector>
@@ -10,38 +10,38 @@
 
 namespace pictura {
 
-/// Whether Muon steps a parameter: the weights of hidden layers. AdamW steps biases, norms, queries, layers that read
-/// positions or pixels, and the two heads.
+/// Returns whether Muon updates a parameter. Muon updates the weights of hidden layers. AdamW updates biases, norms,
+/// queries, layers that read positions or pixels, and the two heads.
 bool is_stepped_by_muon(const NamedTensor& parameter);
 
-/// Root mean squares of the weights of hidden layers (is_stepped_by_muon), whichever optimizer steps them: over all
-/// weights, and the maximum over matrices. 0 without such layers.
+/// Root mean squares of the weights of hidden layers (is_stepped_by_muon()), even if AdamW updates them. all: over all
+/// these weights. largest: maximum over matrices. Both are 0 without such layers.
 struct WeightRms {
   double all = 0, largest = 0;
 };
-/// Root mean squares of these parameters. Waits for their device.
+/// Returns the root mean squares of these parameters. Waits for their device.
 WeightRms weight_rms(const std::vector<NamedTensor>& parameters);
 
-/// Returns matrices [n, rows, columns] with the singular vectors of `matrices` and singular values near 1 (.7 to 1.2,
-/// for values of 1/200 of the Frobenius norm or more), by five Newton-Schulz steps computed in `type`. A zero matrix
-/// stays zero.
+/// Returns matrices [n, rows, columns] with the singular vectors of `matrices` and singular values near 1. Computes
+/// them by five Newton-Schulz steps in `type`. Singular values of 1/200 of the Frobenius norm or more become .7 to 1.2.
+/// A zero matrix stays zero.
 at::Tensor orthogonalized(const at::Tensor& matrices, at::ScalarType type);
 
 class Muon {
  public:
   /// Creates the optimizer. weights: f32 leaves with gradients, [out, ...], on `device`; each is stepped as the matrix
-  /// [out, rest]. type: type of the products. uses_graphs: steps are launched as one CUDA graph, on a stream that can
-  /// be captured.
+  /// [out, rest]. type: data type of matrix products. uses_graphs: whether each step is launched as one CUDA graph; the
+  /// current stream must then be one that can be captured.
   Muon(std::vector<at::Tensor> weights, at::ScalarType type, double weight_decay, Device device = {},
        bool uses_graphs = false);
 
   /// Takes one step along the weights' gradients. failed: f32 scalar; if it is not 0, neither weights nor momentum
   /// change, whatever the gradients are. Does not wait for the device.
   void step(double learning_rate, const at::Tensor& failed);
-  /// Discards the captured graph; must be called if gradients move.
+  /// Discards the captured graph. Must be called if the addresses of gradients change.
   void discard_graph();
 
-  /// Momentum of weight i, in its shape.
+  /// Returns the momentum of weight i, in the shape of the weight.
   at::Tensor momentum(size_t i) const { return parts_of(momentum_)[i]; }
 
  private:
@@ -55,7 +55,7 @@ class Muon {
   void take_step();
   static std::vector<Batch> make_batches(const std::vector<at::Tensor>& weights);
   void index_batches();
-  // Splits a vector of all weights' elements into tensors of their shapes.
+  // Splits a vector of all weights' elements into tensors of the weights' shapes.
   std::vector<at::Tensor> parts_of(const at::Tensor& flat) const;
 
   std::vector<at::Tensor> weights_;
@@ -66,7 +66,7 @@ class Muon {
   // Index of each batch element in a vector of all weights' elements (for padding, the vector's size), and the inverse
   // mapping.
   at::Tensor element_of_place_, place_of_element_;
-  std::vector<at::Tensor> scales_;  // factor of the step by weight, [weights, 1, 1] of each batch
+  std::vector<at::Tensor> scales_;  // [batches] factor of the step of each weight in the batch, [weights, 1, 1]
   at::Tensor rate_, failed_;        // f32 scalars of this step
   Graphs graphs_;
   RepeatedWork step_;

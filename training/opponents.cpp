@@ -21,8 +21,8 @@ struct Opponents::Opponent {
 
 namespace {
 
-// Returns an opponent's configuration: observations and decision steps as in its training, everything else from the
-// run, since threads, precision and determinism are settings of the process.
+// Returns an opponent's configuration. Observations and decision steps are those of its training. The sections `run`
+// and `train` are those of the run, because threads, precision and determinism are settings of the process.
 Config config_of(const SavedPolicy& saved, const Config& run) {
   Config config = saved.config;
   config.run = run.run;

@@ -1,5 +1,5 @@
-// Opponents: saved policies that drive shares of a run's agents, each from the observations of its training. The
-// learner learns nothing from their agents.
+// Opponents: saved policies that drive shares of a run's agents. Each opponent reads the observations with which it was
+// trained. The learner does not learn from the agents of opponents.
 #pragma once
 
 #include <memory>
@@ -16,22 +16,24 @@ namespace pictura {
 class Opponents {
  public:
   /// Creates the opponents of simulator.others.policies, on `device`, with the precision of the run. Throws Error
-  /// naming a file if it holds no policy, reads slots of the ego vector that the learner must not have, or holds its
-  /// actions for a number of steps that does not divide a rollout.
+  /// naming a file if it contains no policy, or if its policy reads auxiliary slots (observed numbers that no image
+  /// shows) that the learner must not have. Also throws if its policy repeats an action for a number of steps that does
+  /// not divide train.num_steps.
   Opponents(const Config& config, Device device, Communicator* communicator);
   ~Opponents();
   Opponents(const Opponents&) = delete;
   Opponents& operator=(const Opponents&) = delete;
 
-  /// Adds the arrays that the opponents read to those that a simulator writes.
+  /// Adds the observation arrays that the opponents read to a simulator's configuration.
   void add_arrays(SimulatorConfig* config_inout) const;
   /// Prepares to drive in the run's simulator, which must outlive this object.
   void enter(const Simulator& simulator);
 
-  /// Mask of the agents that the learner drives after the simulator's last step, u8 [slots].
+  /// Returns a mask of the agents that the learner drives after the simulator's last step, u8 [slots].
   at::Tensor own_slots(const SimulatorArrays& input) const;
-  /// Returns the commands of all agents, [slots]: `own_actions` [slots], replaced by the opponents' draws for their
-  /// agents. A later call overwrites the result. On a device waits for the number of agents of each opponent.
+  /// Returns the commands of all agents, [slots]. The learner's agents take `own_actions`, [slots]; opponents' agents
+  /// take actions that the opponents draw. A later call overwrites the result. On a GPU, waits for the number of each
+  /// opponent's agents.
   Span<const Command> commands(const SimulatorArrays& input, Span<const int32_t> own_actions, PolicyExecutor* executor);
 
  private:

@@ -42,7 +42,7 @@ void Optimizer::clear_gradients() { gradients_.zero_(); }
 
 at::Tensor Optimizer::gradient_norm() const {
   at::Tensor norm = gradients_.norm();
-  // Weights that move together count as one weight, whose gradient each of them has.
+  // Weights that change together count as one weight, because each has the gradient of that one weight.
   for (size_t i = 0; i < parameters_.size(); ++i) {
     if (rate_factors[i] == 1) continue;
     norm = (norm.square() - (1 - rate_factors[i]) * parameters_[i].value.grad().square().sum()).sqrt();
@@ -75,7 +75,8 @@ void Optimizer::step_adamw(double learning_rate, const at::Tensor& failed) {
   for (const auto& [factor, group] : groups) {
     const std::vector<at::Tensor> counts(group.values.size(),
                                          at::full({}, static_cast<double>(steps), failed.options()));
-    // AdamW multiplies the decay by the learning rate, so the factor is divided out of it.
+    // AdamW multiplies the weight decay by the learning rate, which contains the factor, so the decay is divided by the
+    // factor.
     at::_fused_adamw_(group.values, group.gradients, group.first, group.second, {}, counts, learning_rate * factor,
                       config_.adam_beta1, config_.adam_beta2, config_.weight_decay / factor, config_.adam_eps,
                       /*amsgrad=*/false, /*maximize=*/false, /*grad_scale=*/{}, failed);

@@ -1,5 +1,5 @@
-// Optimizer: AdamW (Loshchilov and Hutter, 2019; the paper's) on all parameters, or Muon on the weights of hidden
-// layers and AdamW on the rest.
+// Optimizer: AdamW (Loshchilov and Hutter, 2019) on all parameters, as in the paper, or Muon on the weights of hidden
+// layers and AdamW on the other parameters.
 #pragma once
 
 #include <optional>
@@ -11,31 +11,32 @@ namespace pictura {
 
 class Optimizer {
  public:
-  /// Creates the optimizer of a policy's parameters, which lie on `device`; calls allocate_gradients(). uses_graphs:
-  /// see Muon.
+  /// Creates the optimizer of a policy's parameters, which are on `device`, and calls allocate_gradients().
+  /// uses_graphs: see Muon.
   Optimizer(const Policy& policy, const TrainSection& config, Device device = {}, bool uses_graphs = false);
 
-  /// Norm of the gradients, f32 scalar on their device, without waiting; see rate_factors.
+  /// Returns the norm of the gradients, weighted by rate_factors, as an f32 scalar on their device. Does not wait for
+  /// the device.
   at::Tensor gradient_norm() const;
   /// Steps along the parameters' gradients, and clears them. failed: f32 scalar on their device; if it is not 0,
   /// neither parameters nor moments change, whatever the gradients are.
   void step(double learning_rate, const at::Tensor& failed);
 
-  /// Gradients of all parameters, in their order: f32 [num_parameters].
+  /// Returns the gradients of all parameters, concatenated in the order of the parameters: f32 [num_parameters].
   const at::Tensor& gradients() const { return gradients_; }
   /// Sets the gradients to 0.
   void clear_gradients();
-  /// Allocates zero gradients, which are parts of one vector and to which backward passes add. Must be called after the
+  /// Allocates gradients of 0, which are parts of one vector. Backward passes add to them. Must be called after the
   /// shape of a parameter changes.
   void allocate_gradients();
 
   /// AdamW's first moments and Muon's momentum, in the order of the policy's parameters.
   std::vector<NamedTensor> first_moments;
-  /// Second moments of the parameters that AdamW steps, in their order.
+  /// Second moments of the parameters that AdamW updates, in the order of the policy's parameters.
   std::vector<NamedTensor> second_moments;
-  /// Factors of AdamW's learning rate, in the order of the policy's parameters: 1 except for weights that move together
-  /// (policy/patch_spread.h). The gradient norm scales the squares of their gradients by the same factor. Weight decay
-  /// keeps the full rate.
+  /// Factors of AdamW's learning rate, in the order of the policy's parameters. A factor is 1, or smaller for a group
+  /// of weights that change together (policy/patch_spread.h). gradient_norm() multiplies squares of gradients by the
+  /// same factor. Weight decay uses the full rate.
   std::vector<double> rate_factors;
   int64_t steps = 0;
 

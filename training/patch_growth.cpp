@@ -42,7 +42,7 @@ void spread_first_convolution(const Policy& policy, int factor, Optimizer* optim
                               WeightAverage* average_inout) {
   const at::NoGradGuard no_grad;
   const size_t index = first_convolution_among(policy.parameters());
-  // In place, so that the network's layer and the list of parameters share one tensor.
+  // Replaced in place, so that the network's layer and the list of parameters still share one tensor.
   const at::Tensor& weight = policy.parameters()[index].value;
   weight.set_data(spread_over_patches(weight, factor));
   for (std::vector<NamedTensor>* moments : {&optimizer_inout->first_moments, &optimizer_inout->second_moments}) {

@@ -1,4 +1,5 @@
-// Time of an update by phase: a clock on the host, events on a device, which do not wait.
+// Measures the time of an update by phase: with a clock on the host, and with CUDA events on a GPU, without waiting for
+// it.
 #pragma once
 
 #include <memory>
@@ -17,7 +18,7 @@ class PhaseTimer {
  public:
   explicit PhaseTimer(Device device) : device_(device) {}
 
-  /// Scope whose lifetime counts as time of a phase; without a timer nothing is measured. Scopes do not nest. In
+  /// Scope whose lifetime counts as time of a phase. With a null timer nothing is measured. Scopes must not nest. In
   /// NVIDIA's profilers each scope is an NVTX range with the phase's name.
   class Scope {
    public:
@@ -29,11 +30,11 @@ class PhaseTimer {
    private:
     PhaseTimer* timer_;
     Phase phase_;
-    size_t begin_ = 0;  // index of its first event, on a device
+    size_t begin_ = 0;  // on a GPU: index of the scope's first event
     Stopwatch watch_;
   };
 
-  /// Seconds of each phase since the last call. Waits for the device.
+  /// Returns the seconds of each phase since the last call. Waits for the device.
   PhaseSeconds take();
 
  private:

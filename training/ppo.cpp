@@ -1,7 +1,7 @@
-// One PPO update, to be read from top to bottom like CleanRL's ppo.py: the losses; then PpoUpdate::run() and its steps
-// in order, which are advantages, filter, minibatches, gradients, optimizer and statistics. Tensors hold the
-// transitions of this rank; the communicator sums over ranks. ChunkRunner handles chunks and CUDA graphs, Minibatches
-// the order over all ranks.
+// One PPO update, which can be read from top to bottom like CleanRL's ppo.py. First come the losses, then
+// PpoUpdate::run() and its steps in order: advantages, filter, minibatches, gradients, optimizer and statistics.
+// Tensors hold the transitions of this rank; the communicator sums over ranks. ChunkRunner handles chunks and CUDA
+// graphs. Minibatches handles the order of transitions over all ranks.
 #include "pictura/training/ppo.h"
 
 #include <algorithm>
@@ -20,9 +20,10 @@ namespace pictura {
 
 namespace {
 
-// Log-probabilities of the actions taken at these rows. all_log_probs: [rows, kNumActions].
+// Returns the log-probabilities of the actions taken at these rows. all_log_probs: [rows, kNumActions].
 at::Tensor log_probs_of(const at::Tensor& all_log_probs, const Targets& targets, const at::Tensor& rows) {
-  // Sum in which all terms but one are 0: the gradient of gather() waits for the host if algorithms are deterministic.
+  // All terms of this sum but one are 0. It replaces gather(), whose gradient waits for the host if algorithms are
+  // deterministic.
   const at::Tensor actions = targets.actions.index_select(0, rows).unsqueeze(1);
   return all_log_probs.masked_fill(at::arange(all_log_probs.size(1), actions.options()) != actions, 0).sum(1);
 }
@@ -67,7 +68,7 @@ Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Mi
 
 namespace {
 
-// Variance of n numbers, from their sum and the sum of their squares.
+// Returns the variance of n numbers from their sum and the sum of their squares.
 double variance_of(double n, double sum, double sum_of_squares) {
   return std::max(0.0, (sum_of_squares - sum * sum / n) / std::max(1.0, n - 1));
 }
@@ -102,7 +103,7 @@ class PpoUpdate {
           minibatch_stats = add_gradients(minibatch);
         }
         step(minibatch_stats, epoch);
-        if (num_failed_.is_cpu()) check_finite(&minibatches);  // without waiting for a device
+        if (num_failed_.is_cpu()) check_finite(&minibatches);  // on a GPU this would wait
       }
     }
     check_finite(&minibatches);
@@ -112,7 +113,7 @@ class PpoUpdate {
   }
 
  private:
-  // Advantages by GAE (rules/gae.h), and the rollout's transitions flattened to [steps * slots].
+  // Computes advantages by GAE (rules/gae.h), and flattens the rollout's transitions to [steps * slots].
   void compute_advantages() {
     rollout_.compute_advantages(config_.gamma, config_.gae_lambda, learner_.executor);
     advantages_ = rollout_.advantages.flatten();
@@ -124,8 +125,8 @@ class PpoUpdate {
     targets_.teacher_weight = at::full({}, key_.teacher_weight, advantages_.options());
   }
 
-  // Rows to learn from, i64 [n] in ascending order: those that the filter keeps, or all rows, with weight 0 for invalid
-  // ones.
+  // Returns the rows to learn from, i64 [n] in ascending order: the rows that the filter keeps, or all rows if
+  // takes_all(). In the second case, invalid rows have weight 0.
   at::Tensor select_rows() {
     const bool by_quantile = config_.adv_filter == FilterThreshold::quantile;
     const float newest = by_quantile ? quantile_of_advantages() : largest_advantage();
@@ -143,15 +144,16 @@ class PpoUpdate {
   }
   bool takes_all() const { return config_.halted_slots == HaltedSlots::draw; }
 
-  // Largest |advantage| of all ranks; not finite if any advantage is not finite. Waits for the device.
+  // Returns the largest |advantage| of all ranks; not finite if any advantage is not finite. Waits for the device.
   float largest_advantage() const {
-    // The maximum of some communicators ignores NaN.
+    // Some communicators ignore NaN in a maximum.
     const at::Tensor max = advantages_.abs().max().nan_to_num(std::numeric_limits<double>::infinity());
     learner_.communicator->max(max);
     return max.item<float>();
   }
 
-  // Quantile of the valid |advantages| of all ranks; not finite if any advantage is not finite. Waits for the device.
+  // Returns the quantile of the valid |advantages| of all ranks; not finite if any advantage is not finite. Waits for
+  // the device.
   float quantile_of_advantages() const {
     const at::Tensor counts = at::zeros({kNumFilterBins}, advantages_.options().dtype(at::kLong));
     learner_.executor->count_advantages(span_of<const float>(advantages_), span_of<const uint8_t>(valid_),
@@ -202,16 +204,16 @@ class PpoUpdate {
     }
   }
 
-  // Runs a minibatch forward and backward, which adds this rank's part of its gradient to those of the parameters.
-  // Returns the minibatch's statistics over all ranks, valid until the next call.
+  // Runs a minibatch forward and backward. This adds this rank's part of the minibatch's gradient to the parameters'
+  // gradients. Returns the minibatch's statistics over all ranks, valid until the next call.
   at::Tensor add_gradients(const Minibatch& minibatch) {
     const at::Tensor minibatch_stats = learner_.runner->add_gradients(minibatch, config_.forward_chunk, loss_);
     learner_.communicator->sum(minibatch_stats);
     return minibatch_stats;
   }
 
-  // Whether the rollout's log-probabilities differ from the learner's by more than rounding in the first minibatch.
-  // Values that are not finite are left to check_finite(). Waits for the device.
+  // Returns whether the rollout's log-probabilities differ from the learner's by more than rounding in the first
+  // minibatch. Ignores values that are not finite, because check_finite() handles them. Waits for the device.
   bool must_recompute_log_probs(const at::Tensor& minibatch_stats) {
     const LossStats first = numbers_of(minibatch_stats.cpu());
     const bool differs = first.abs_log_ratio >= kMaxAbsLogRatio || first.clip_fraction >= kMaxClipFraction;
@@ -220,8 +222,8 @@ class PpoUpdate {
     return true;
   }
 
-  // Replaces the log-probabilities of kept transitions by those of the learner's forward pass, in the minibatches and
-  // chunks in which they are learnt from next, so that batch sizes agree too.
+  // Replaces the log-probabilities of kept transitions by those of the learner's forward pass. This pass uses the same
+  // minibatches and chunks as the update that follows, so that batch sizes agree too.
   void recompute_log_probs(const Minibatches& minibatches) {
     const at::NoGradGuard no_grad;
     const at::Tensor log_probs = targets_.old_log_probs.clone();
@@ -238,8 +240,8 @@ class PpoUpdate {
   }
 
   // Steps along the clipped gradient of all ranks. The gradient is summed over ranks before it is clipped, so every
-  // rank takes the same step, to the bit. Values that are not finite stay in sums_, so no minibatch takes a step after
-  // the first failure.
+  // rank takes a bit-identical step. Values that are not finite stay in sums_, so no minibatch takes a step after the
+  // first failure.
   void step(const at::Tensor& minibatch_stats, int epoch) {
     const at::NoGradGuard no_grad;
     const PhaseTimer::Scope timed(learner_.timer, Phase::optimize);
@@ -283,7 +285,8 @@ class PpoUpdate {
                     contents);
   }
 
-  // Stores the means over minibatches of the whole update and of each epoch, and the first minibatch.
+  // Stores the statistics: means over the minibatches of the whole update and of each epoch, and those of the first
+  // minibatch.
   void store_means() {
     const at::Tensor sums = sums_.cpu(), epochs = sums.narrow(0, 0, config_.update_epochs);
     const auto num_minibatches = static_cast<double>(stats_.minibatches);
@@ -303,7 +306,7 @@ class PpoUpdate {
   };
   at::Tensor advantages_, values_, valid_;  // [steps * slots]
   Targets targets_;
-  at::Tensor sums_;        // f64 [epochs + 1, kNumLossStats], over minibatches; the last row is the first minibatch
+  at::Tensor sums_;        // f64 [epochs + 1, kNumLossStats], sums over minibatches; the last row: the first minibatch
   at::Tensor num_failed_;  // f32 scalar, number of minibatches that took no step
   UpdateStats stats_;
 };

@@ -1,6 +1,6 @@
 // Proximal policy optimization (Schulman et al., 2017) with the paper's settings: clipped surrogate, plain value loss,
-// entropy bonus, advantages filtered per rollout and normalised per minibatch, AdamW under a cosine schedule. Beyond
-// the paper: a teacher to imitate for a while.
+// entropy bonus, advantages filtered per rollout and normalised per minibatch, AdamW under a cosine schedule. In
+// addition to the paper, the policy can imitate a teacher in the first part of training.
 #pragma once
 
 #include <optional>
@@ -14,28 +14,29 @@ namespace pictura {
 
 /// State of the advantage filter (rules/advantage_filter.h) across rollouts.
 struct AdvantageFilter {
-  double average = -1;  // average of the rollouts' maxima or quantiles; negative before the first
+  double average = -1;  // average over rollouts of the largest |advantage| or a quantile; negative at first
 };
 
 /// Upper bounds of the difference between a rollout's log-probabilities and the learner's before the first step, when
-/// they differ by rounding alone: of the mean absolute difference, and of the share of ratios beyond the clip range.
+/// only rounding makes them differ. The first bounds the mean absolute difference, the second the share of ratios
+/// outside the clip range. Larger differences cause the log-probabilities to be recomputed.
 constexpr double kMaxAbsLogRatio = 1e-3, kMaxClipFraction = 1e-3;
 
 /// Statistics of an update.
 struct UpdateStats {
-  LossStats all;                      // means over its minibatches
+  LossStats all;                      // means over the update's minibatches
   LossStats first;                    // losses of the first minibatch, before the parameters change
-  std::optional<LossStats> rejected;  // `first` with the rollout's log-probabilities, if these were recomputed
+  std::optional<LossStats> rejected;  // `first` before log-probabilities were recomputed, if they were
   std::vector<LossStats> epochs;      // means over each epoch's minibatches
   GradientNorms gradient_norms;
   double learning_rate = 0;
-  double explained_variance = 0;  // over all valid transitions
+  double explained_variance = 0;  // share of the returns' variance that values explain, over all valid transitions
   double kept_fraction = 0, adv_threshold = 0;
   int64_t minibatches = 0;
   WeightRms weights;  // after the update
 };
 
-/// Objects that an update works with, which must outlive it.
+/// Objects that an update uses. They must outlive the update.
 struct Learner {
   ChunkRunner* runner;  // runner of the policy and of the rollout's observations
   LearnerExecutor* executor;
@@ -45,32 +46,32 @@ struct Learner {
   Communicator* communicator = single_communicator();
 };
 
-/// Key of an update: its inputs besides its rollout and its settings.
+/// Inputs of an update other than its rollout and settings.
 struct UpdateKey {
-  uint64_t seed = 0;  // with `update`, key of the transitions' order
+  uint64_t seed = 0;  // `seed` and `update` determine the order of transitions
   int64_t update = 0;
   double learning_rate = 0;
   double teacher_weight = 0;
 };
 
-/// Error of a loss or a gradient that is not finite; names update, epoch and minibatch, counted from 1.
+/// Error thrown if a loss or a gradient is not finite. Its message names update, epoch and minibatch, counted from 1.
 class NotFinite : public Error {
  public:
   NotFinite(const std::string& message, std::vector<NamedTensor> its_minibatch)
       : Error(message), minibatch(std::move(its_minibatch)) {}
-  /// Tensors rows (of the rollout), actions, advantages, log_probs, returns, and the observation's arrays except
-  /// images.
+  /// Tensors of the minibatch: rows (of the rollout), actions, advantages, log_probs, returns, and the observation's
+  /// arrays except images.
   std::vector<NamedTensor> minibatch;
 };
 
-/// PPO losses of a chunk; see LossFunction.
+/// Returns the PPO losses of a chunk; see LossFunction.
 Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Minibatch& chunk,
                   const TrainSection& config);
 
-/// Improves the policy on a rollout, whose advantages it computes. Each rank has consecutive slots of one rollout, with
-/// equally many steps. All ranks improve one policy on the whole rollout, and get the same parameters to the bit and
-/// the same statistics. Throws NotFinite if the loss or gradient of a minibatch is not finite: on the host at that
-/// minibatch, on a device at the end of the update. The policy is then as it was before that minibatch.
+/// Improves the policy on a rollout, and computes the rollout's advantages. Each rank has consecutive slots of one
+/// rollout, with equally many steps. All ranks improve one policy on the whole rollout, and get bit-identical
+/// parameters and equal statistics. Throws NotFinite if the loss or gradient of a minibatch is not finite: on the host
+/// at that minibatch, on a device at the end of the update. The policy is then as it was before that minibatch.
 UpdateStats ppo_update(const Learner& learner, Rollout* rollout, const TrainSection& config, const UpdateKey& key);
 
 }  // namespace pictura

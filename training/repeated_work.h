@@ -1,5 +1,6 @@
-// Repeated work of the learner on the same memory. On a CUDA device it is captured into a graph, which one call
-// launches: networks of a few thousand agents are so fast that their kernels would wait for the host.
+// Repeated work of the learner on the same memory. On a CUDA device the work is captured into a graph, which one call
+// launches. With a few thousand agents, a network's kernels are so fast that they would otherwise wait for launches by
+// the host.
 #pragma once
 
 #include <functional>
@@ -11,7 +12,8 @@
 namespace pictura {
 
 /// Memory of the tensors that are created during graph capture; no other tensor is allocated there. Graphs share the
-/// memory, since they are launched one after the other. Results that must outlast a graph are held by a tensor.
+/// memory, because they are launched one after the other. A result that is used after another graph's launch must be
+/// held by a tensor.
 class GraphMemory {
  public:
   explicit GraphMemory(Device device) : device_(device) {}
@@ -38,9 +40,9 @@ class Graphs {
   Graphs(Device device, bool are_used) : device_(device), are_used_(are_used), memory_(device) {}
 
   bool are_used() const { return are_used_; }
-  /// Captures a graph of the work that `work` enqueues on torch's current stream, which must not be a stream that waits
-  /// for others. Throws Error naming the key if the work cannot be captured, and c10::OutOfMemoryError if memory is too
-  /// small.
+  /// Captures a graph of the work that `work` enqueues on torch's current stream. This stream must not be one that
+  /// waits for other streams, such as the default stream. Throws Error naming train.graphs if the work cannot be
+  /// captured, and c10::OutOfMemoryError if memory is too small.
   std::unique_ptr<DeviceGraph> capture(const std::function<void()>& work);
   void launch(DeviceGraph* graph);
   /// Frees memory. Must be called before capturing work that needs much memory.
@@ -58,12 +60,12 @@ class Graphs {
   int64_t num_launches_ = 0;
 };
 
-/// Work that is executed call by call the first time, which loads and selects everything that it needs, is captured the
-/// second time, and launched as a graph from then on.
+/// Work that is executed repeatedly. The first execution runs call by call, which loads and selects everything that the
+/// work needs. The second execution is captured into a graph. Later executions launch this graph.
 class RepeatedWork {
  public:
   enum class Mode { calls, capture, launch };
-  /// Mode of the next execution. `is_settled`: the work's memory will not move from now on.
+  /// Returns the mode of the next execution. `is_settled`: whether the work's memory keeps its addresses from now on.
   Mode next_mode(const Graphs& graphs, bool is_settled);
   /// Executes the work. Captured or launched work must not wait, and must do the same in every execution.
   void run(Mode mode, Graphs* graphs, const std::function<void()>& work);

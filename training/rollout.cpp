@@ -40,7 +40,7 @@ void RolloutObservations::set_renderer(Renderer* renderer) {
 }
 
 void RolloutObservations::keep_images_of(const Rig& rig) {
-  kept_images_.reset();  // freed before new images are allocated
+  kept_images_.reset();  // free the memory before new images are allocated
   const int64_t num_rows = arrays_.ego.size(0), num_slots = arrays_.ego.size(1);
   kept_images_ = std::make_unique<KeptImages>(
       rig, num_rows, num_slots, num_slots * num_kept_images(num_rows - 1, decision_steps_), simulator_->device());

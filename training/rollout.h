@@ -1,5 +1,5 @@
-// Rollout: observations, actions and results of all slots of a simulator, as tensors on the learning device; time
-// first.
+// Rollout: observations, actions and results of all slots of a simulator, as tensors on the learning device. The first
+// dimension of each tensor is the step.
 #pragma once
 
 #include "pictura/common/scene_history.h"
@@ -10,36 +10,37 @@
 
 namespace pictura {
 
-/// Observations of all slots at each step. Images of agents that decide are kept, or drawn again from the scenes
-/// whenever they are read: the images of the paper's rollout would take 163 GB, its scenes 0.25 GB.
+/// Observations of all slots at each step. Images of agents that select a new action are kept, or drawn again from
+/// stored scenes whenever they are read. Drawing again saves memory: the images of the paper's rollout would take 163
+/// GB, its scenes take 0.25 GB.
 class RolloutObservations {
  public:
-  /// Allocates train.num_steps + 1 steps of this simulator. The simulator must outlive the object, as must the renderer
-  /// and the timer (for images that are kept). Policies without images need no renderer. training/memory.h estimates
-  /// the memory.
+  /// Allocates train.num_steps + 1 steps of this simulator. The simulator, the renderer and the timer must outlive this
+  /// object. The timer measures the drawing of images that are kept. Policies without images need no renderer.
+  /// training/memory.h estimates the memory.
   RolloutObservations(const Config& config, Simulator* simulator, Renderer* renderer, PhaseTimer* timer);
-  /// Observations without images: arrays [num_steps + 1, slots, ...].
+  /// Creates observations without images. arrays: [num_steps + 1, slots, ...].
   explicit RolloutObservations(Observation arrays) : arrays_(std::move(arrays)) {}
 
-  /// From now on draws with another renderer. Its rig must have the same number of cameras. Kept images are lost.
+  /// Replaces the renderer. The new renderer's rig must have the same number of cameras. Kept images are lost.
   void set_renderer(Renderer* renderer);
 
   /// Records the simulator's present observations as those of `step`. slots: i64 [n], the slots whose images are kept.
   /// The first rollout must record its steps in order.
   void record(int64_t step, const at::Tensor& slots);
 
-  /// Gathers the observations of rows, i64 [batch] of step * slots + slot, of agents that were active at those steps.
-  /// Images that are drawn here are drawn as by draw_images().
+  /// Gathers the observations of rows. rows: i64 [batch] of step * slots + slot; the agents must have been active at
+  /// these steps. If images are drawn again, draw_images() draws them with this patch_px.
   Observation gather(const at::Tensor& rows, int patch_px = 0) const;
 
   /// Whether images are kept when they are drawn.
   bool keep_images() const { return kept_images_ != nullptr; }
   /// Whether gather() draws images.
   bool draws_when_gathered() const { return scenes_ != nullptr; }
-  /// Whether every step has been recorded. From then on gather() works on the same memory, and so does record() if no
-  /// images are kept, until generation() changes.
+  /// Whether every step has been recorded. From then on, gather() uses the same memory in each call until generation()
+  /// changes. So does record() if no images are kept.
   bool are_complete() const { return are_complete_; }
-  /// Number of times that the renderer's memory or that of kept images has moved.
+  /// Number of times that the memory of the renderer or of kept images has moved.
   uint64_t generation() const {
     return (renderer_ ? renderer_->generation() : 0) + (kept_images_ ? kept_images_->generation() : 0);
   }
@@ -61,27 +62,27 @@ class RolloutObservations {
 };
 
 struct Rollout {
-  RolloutObservations observations;         // num_steps + 1 steps; the last is seen after the last action
+  RolloutObservations observations;         // num_steps + 1 steps; the last one follows the last action
   at::Tensor values;                        // f32 [num_steps + 1, num_slots]; 0 for agents that were not active
   at::Tensor actions;                       // i32 [num_steps, num_slots], as everything below
-  at::Tensor log_probs;                     // f32, of the chosen actions
+  at::Tensor log_probs;                     // f32, log-probabilities of `actions`
   at::Tensor rewards;                       // f32
   at::Tensor terminated, truncated, valid;  // u8, as StepResult defines them
-  at::Tensor decides;                       // u8, 0 where an action is held; undefined if no action is ever held
-  at::Tensor advantages;                    // f32, see rules/gae.h
-  at::Tensor teacher_log_probs;             // f32 [num_steps, num_slots, kNumActions]; undefined without a teacher
+  at::Tensor decides;            // u8; 0 where an agent repeats its last action; undefined if agents never do so
+  at::Tensor advantages;         // f32, see rules/gae.h
+  at::Tensor teacher_log_probs;  // f32 [num_steps, num_slots, kNumActions]; undefined without a teacher
 
   Rollout(RolloutObservations its_observations, int64_t num_steps, int64_t num_slots, Device device);
   int64_t num_steps() const { return actions.size(0); }
   int64_t num_slots() const { return actions.size(1); }
 
-  /// Steps to learn from, u8 [num_steps, num_slots]: valid steps at which the agent decided.
+  /// Returns the steps to learn from, u8 [num_steps, num_slots]: valid steps at which the agent selected a new action.
   at::Tensor decisions() const { return decides.defined() ? valid * decides : valid; }
-  /// Rows of these slots, i64 [n], at a step.
+  /// Returns the rows of `slots`, i64 [n], at a step.
   at::Tensor rows_of(int64_t step, const at::Tensor& slots) const { return slots + step * num_slots(); }
-  /// Actions of one step, [num_slots], to be filled in.
+  /// Returns the actions of one step, [num_slots], for the caller to fill in.
   Span<int32_t> actions_at(int64_t step);
-  /// Records the results of a step, in the memory of `device`.
+  /// Records the results of a step, which are in the memory of `device`.
   void set_result(int64_t step, const StepResult& result, Device device);
   /// Fills `advantages` from rewards, values and flags.
   void compute_advantages(double gamma, double gae_lambda, LearnerExecutor* executor);

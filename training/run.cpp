@@ -63,8 +63,8 @@ std::unique_ptr<Renderer> make_training_renderer(const Config& config, const Rig
   return renderer;
 }
 
-// Whether work is captured into graphs. A backbone program may do work that graphs cannot hold, and OpenGL's drawing is
-// not CUDA work.
+// Whether work is captured into graphs. A backbone program may do work that graphs cannot contain, and OpenGL's drawing
+// is not CUDA work.
 bool uses_graphs(const Config& config, Device device, const Renderer* renderer) {
   return config.train.graphs == "auto" && !device.is_host() && (!renderer || renderer->name() == "cuda") &&
          config.policy.backbone == "conv";
@@ -144,7 +144,7 @@ Checkpoint Run::checkpoint(const std::vector<RecentUpdate>& recent) const {
   }
   checkpoint.simulator = simulator->save();
   if (communicator->size() > 1 && scenes) {
-    checkpoint.simulator.clear();  // no rank has the scenes of all
+    checkpoint.simulator.clear();  // no rank has the scenes of all ranks
   } else if (communicator->size() > 1) {
     const std::vector<std::vector<uint8_t>> parts = communicator->gather(checkpoint.simulator);
     checkpoint.simulator.clear();
@@ -176,7 +176,7 @@ std::string Run::update_image_size() {
   const bool has_other_patches = patches_of(before) != patches_of(in_force);
   if (size_of(before) == size_of(in_force) && !has_other_patches) return "";
   rig = rig_of(config, agent_steps);
-  renderer.reset();  // its memory is freed before the next renderer's is allocated
+  renderer.reset();  // frees its memory before the next renderer allocates memory
   renderer = make_training_renderer(in_force, rig, *simulator);
   rollout.observations.set_renderer(renderer.get());
   chunks.clear();
@@ -229,8 +229,8 @@ void Run::load_policy(const SavedPolicy& other) {
       !config.reads_images() || !other.config.reads_images() || other.rig.cameras.size() == rig.cameras.size(),
       "{}: its policy uses {} cameras, expected {}, as in {}", other.path, other.rig.cameras.size(), rig.cameras.size(),
       config.render.rig.empty() ? "the paper's rig" : config.render.rig);
-  // Checked here, since settings without parameters would go unnoticed, and differing shapes would not name the
-  // setting.
+  // These settings are checked here, because some of them change no parameters, and an error about shapes would not
+  // name the setting.
   for (const auto& [key, got, expected] :
        {std::tuple{"policy.segment_features", other.config.policy.segment_features, config.policy.segment_features},
         std::tuple{"policy.layer_norm", other.config.policy.layer_norm, config.policy.layer_norm},

@@ -1,5 +1,5 @@
-// Training run: all its objects, created from a configuration, saved to a checkpoint and restored from one. With
-// several ranks each rank has its part of the worlds, and all of the rest.
+// Training run with all its objects. A run is created from a configuration, and can be saved to a checkpoint and
+// restored from one. With several ranks, each rank has a part of the worlds and a copy of everything else.
 #pragma once
 
 #include <optional>
@@ -23,7 +23,7 @@ struct Run {
   Run(const Config& config, Device device, Communicator* communicator = single_communicator(),
       std::unique_ptr<const Policy> policy = nullptr);
 
-  /// Calls `work`, with graphs on a stream that can be captured.
+  /// Calls `work`. If graphs are used, torch's current stream is then one that can be captured.
   void on_stream(const std::function<void()>& work) const;
 
   /// Copies the weights of another run. Throws Error naming the difference if the networks differ.
@@ -35,27 +35,28 @@ struct Run {
   /// Returns the contents of a checkpoint at the start of an update. Collective over all ranks; rank 0 writes it, and
   /// the results of other ranks contain no simulator.
   Checkpoint checkpoint(const std::vector<RecentUpdate>& recent) const;
-  /// Resumes from a checkpoint of any number of ranks. If the simulator cannot read its saved state, because its rules
-  /// or maps have changed since, new episodes begin, and the return value states the reason; else it is empty. Moments
-  /// of another optimizer are discarded, and new moments start. Throws Error naming the difference if the checkpoint
+  /// Resumes from a checkpoint of any number of ranks. The simulator cannot read its saved state if its rules or maps
+  /// have changed since. New episodes then begin, and the return value states the reason; else it is empty. Moments of
+  /// another optimizer are ignored, and new moments start at 0. Throws Error naming the difference if the checkpoint
   /// was saved under another configuration or with other cameras.
   std::string restore(const Checkpoint& saved);
   /// Improves the policy on the rollout. Throws the errors of ppo_update().
   UpdateStats update_policy();
-  /// Throws Error naming a parameter that differs in a bit between ranks.
+  /// Throws Error naming a parameter that is not bit-identical on all ranks.
   void check_ranks_agree() const;
 
-  /// Switches to the image size that render.schedule has for the completed agent-steps, and spreads the first
-  /// convolution if its patches grow. Returns a sentence that describes the change, or an empty text.
+  /// Switches to the image size that render.schedule specifies for the completed agent-steps. If the patches of the
+  /// first convolution grow, spreads its weights over them. Returns a sentence that describes the change, or an empty
+  /// text.
   std::string update_image_size();
-  /// Replaces recorded scenes by those that are due after the completed updates; returns whether it did. All worlds
-  /// then begin new episodes, and graphs of the previous worlds are stale.
+  /// Replaces recorded scenes if other scenes are due after the completed updates. Returns whether scenes were
+  /// replaced. If so, all worlds begin new episodes, and graphs of the previous worlds are invalid.
   bool exchange_scenes();
   /// Current size of the first camera's images; 0 without images.
   ImageSize image_size() const;
 
   const Config config;
-  Config in_force;  // config_at(config, agent_steps) of the last update_image_size()
+  Config in_force;  // result of config_at(config, agent_steps) in the last update_image_size()
   const Device device;
   Communicator* const communicator;
   const std::vector<WorldSpec> all_worlds;       // worlds of all ranks
@@ -76,19 +77,19 @@ struct Run {
   const std::optional<OwnStream> stream;  // only with graphs
   Graphs graphs;                          // graphs of `chunks`
   ChunkRunner chunks;
-  int64_t scene_set = 0;    // set of recorded scenes in the worlds
+  int64_t scene_set = 0;    // number of the set of recorded scenes in the worlds
   int64_t update = 0;       // completed updates
   int64_t agent_steps = 0;  // agent-steps of the completed updates
   double distance_m = 0;    // distance driven by all agents in the completed updates
-  // Longest wall times by device and number of agents, such as "NVIDIA H100 80GB HBM3, 20480 agents": of the updates of
-  // the last process that completed an update on that device; and, with the suffix ", evaluation", of the evaluations
-  // within the run.
+  // Longest wall times of updates and evaluations, in s. A key consists of device and number of agents, such as "NVIDIA
+  // H100 80GB HBM3, 20480 agents"; keys of evaluations within the run have the suffix ", evaluation". Times of updates
+  // are those of the last process that completed an update on that device.
   std::map<std::string, double> longest_update_s;
 
  private:
   /// Replaces the worlds' scenes by those of a set.
   void enter_scenes(int64_t set);
-  /// Sets the rate factors of parameters from a saved policy, and all others to 1.
+  /// Sets rate factors to those of a saved policy, and to 1 for parameters without a saved factor.
   void restore_rate_factors(const SavedPolicy& saved);
 };
 

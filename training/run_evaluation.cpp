@@ -7,8 +7,8 @@
 namespace pictura {
 
 RunEvaluation::RunEvaluation(const Run& run) : run_(run) {
-  if (run.config.simulator.has_scenes()) return;  // parse_config() refuses evaluations
-  // Copies follow the maps themselves.
+  if (run.config.simulator.has_scenes()) return;  // parse_config() refuses evaluations with scenes
+  // Copies of maps follow the maps themselves, and are left out.
   const CompiledMaps& maps = run.simulator->maps();
   worlds_.maps.assign(maps.begin(), maps.begin() + static_cast<ptrdiff_t>(run.config.simulator.maps.size()));
 }
@@ -28,7 +28,8 @@ std::optional<EvaluationRecord> RunEvaluation::evaluate() {
   options.steps = config.train.evaluate_steps;
   options.num_threads = config.run.num_threads;
   options.simulator = run_.simulator->name();
-  // Both simulators name the maps 0, 1, ..., so the training maps that were uploaded serve these scenes too.
+  // Both simulators use the handles 0, 1, ... for their maps, so the uploaded training maps also fit the evaluation's
+  // scenes.
   worlds_.renderer = run_.renderer.get();
   PolicySession session(config, run_.rig, run_.device, *run_.policy);
   std::unique_ptr<Renderer> as_mounted;

@@ -19,8 +19,8 @@ class RunEvaluation {
   /// Whether an evaluation is due after the run's completed updates.
   bool is_due() const;
   /// Evaluates in train.evaluate_scenarios worlds of train.evaluate_agents agents for train.evaluate_steps steps. The
-  /// result equals that of `pictura evaluate --scenarios --agents --steps` on the checkpoint, and with --average if the
-  /// run averages weights. Empty after an interrupt.
+  /// result equals that of `pictura evaluate` on the checkpoint, with these numbers as --scenarios, --agents and
+  /// --steps. If the run averages weights, average_row equals the result with --average. Empty after an interrupt.
   std::optional<EvaluationRecord> evaluate();
 
  private:

@@ -67,7 +67,7 @@ bool RunKeeper::is_due(const Run& run) const {
 }
 
 void RunKeeper::save(const Run& run, const std::vector<RecentUpdate>& recent) {
-  // A second save would write the same file in place of an older one.
+  // A second save of the same update would replace an older checkpoint.
   if (run.update == saved_update_) return;
   const auto write = [&](const Checkpoint& checkpoint) {
     save_checkpoint(folder_, run.config.train.keep_checkpoints,

@@ -1,4 +1,4 @@
-// Folder of a training run, which the run owns while it is active, and which holds its checkpoints and weights.
+// Folder of a training run, with its checkpoints and weights. The run owns the folder while it is active.
 #pragma once
 
 #include <functional>
@@ -14,8 +14,8 @@
 
 namespace pictura {
 
-/// Keeper of a run's folder. Rank 0 alone reads and writes. The functions are collective, since a checkpoint contains a
-/// part of each rank.
+/// Keeper of a run's folder. Only rank 0 reads and writes. Every rank must call each function, because a checkpoint
+/// contains a part of each rank.
 class RunKeeper {
  public:
   /// Claims the folder for this process. Throws Error naming the folder if another run is active in it, or if it holds
@@ -24,21 +24,21 @@ class RunKeeper {
   RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* communicator);
 
   /// Starts the run as the options specify: from its last checkpoint, from the weights of another run, or from new
-  /// weights, in which case the untrained policy is saved too. A run that is overwritten stays until the first save().
-  /// Returns the recent updates for the mean return.
+  /// weights. In the last case it also saves the untrained policy. A run that is overwritten stays until the first
+  /// save(). Returns the recent updates for the mean return.
   std::vector<RecentUpdate> begin(Run* run);
 
   /// Whether the configuration asks for a checkpoint after the run's last update.
   bool is_due(const Run& run) const;
-  /// Saves the run as checkpoint.ckpt and keeps older checkpoints, unless this update is saved already.
+  /// Saves the run as checkpoint.ckpt and keeps older checkpoints. Does nothing if this update is already saved.
   void save(const Run& run, const std::vector<RecentUpdate>& recent);
   /// Saves the run under another name in the folder, which later saves do not touch.
   void save_as(const std::string& name, const Run& run, const std::vector<RecentUpdate>& recent) const;
   /// Writes the weights as policy.safetensors, and their average, if there is one, as policy_average.safetensors.
   void write_weights(const Run& run) const;
 
-  /// Folder of the run's files: options.out_folder or, until the first checkpoint of a run that overwrites another, a
-  /// folder in it.
+  /// Folder of the run's files: options.out_folder. If the run overwrites another run, a folder in options.out_folder
+  /// until the first checkpoint.
   const std::string& folder() const { return folder_; }
   std::string path(const std::string& name) const { return folder_ + "/" + name; }
   std::string checkpoint_path() const { return path("checkpoint.ckpt"); }

@@ -16,7 +16,7 @@ namespace pictura {
 
 namespace {
 
-// Number of updates of the mean return.
+// Number of updates over which the mean return is computed.
 constexpr size_t kRecentUpdates = 10;
 
 Scalars scalars_of(const Config& config, const TrainProgress& progress, const UpdateRecord& record) {
@@ -205,7 +205,7 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
   progress.recent_agent_steps_per_s =
       static_cast<double>(agent_steps - minute_.front().agent_steps) / (minute_.back().s - minute_.front().s);
   progress.episode_return = episode_return();
-  // ETA of the last update, or of the end of the schedule, whichever comes first.
+  // Time to the last update or to the end of the schedule, whichever comes first.
   const auto done = static_cast<double>(update - first_update_),
              steps_done = static_cast<double>(agent_steps - first_agent_steps_);
   progress.eta_s = elapsed_s / done * static_cast<double>(config_.train.updates - update);

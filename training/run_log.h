@@ -16,16 +16,16 @@
 
 namespace pictura {
 
-/// CSV file of a run with a row per update. Keeps rows of an existing file that are complete and belong to completed
-/// updates, since a process may have been killed, or a disk full, within a row. A file with other columns is renamed to
-/// PATH.1 (or the next free number), with a notice.
+/// CSV file of a run with a row per update. Of an existing file it keeps the rows that are complete and belong to
+/// completed updates. A row is incomplete if the process was killed or the disk was full. A file with other columns is
+/// renamed to PATH.1 (or the next free number), with a notice.
 class ProgressCsv {
  public:
   ProgressCsv(const std::string& path, const Scalars& columns, int64_t updates_done,
               const std::function<void(const std::string&)>& on_notice);
   /// Appends a row and flushes. Throws Error naming the path if the disk is full.
   void write(int64_t update, const Scalars& scalars);
-  /// Update of the last row; 0 without rows.
+  /// Returns the update of the last row; 0 without rows.
   int64_t last_update() const { return last_update_; }
 
  private:
@@ -36,11 +36,11 @@ class ProgressCsv {
 
 /// Record of one update.
 struct UpdateRecord {
-  SimulatorTotals totals;  // counted in its rollout
+  SimulatorTotals totals;  // counts of the update's rollout
   UpdateStats stats;
   AgentGroups agents;
-  double rollout_s = 0, update_s = 0;  // wall time of the rollout, and of the update
-  PhaseSeconds phases_s{};             // phases of both
+  double rollout_s = 0, update_s = 0;  // wall times of the rollout and of the update
+  PhaseSeconds phases_s{};             // times of the phases of rollout and update
   ImageSize image_size;                // size of the first camera's images; 0 without images
 };
 
@@ -54,8 +54,8 @@ struct EvaluationRecord {
 
 class RunLog {
  public:
-  /// Opens the files of a run with `updates_done` completed updates and `agent_steps` agent-steps in them; with an
-  /// empty folder it writes no files. Throws Error naming the path.
+  /// Opens the files of a run that has completed `updates_done` updates with `agent_steps` agent-steps. If `folder` is
+  /// empty, it writes no files. Throws Error naming the path.
   RunLog(const std::string& folder, const Config& config, int64_t updates_done, int64_t agent_steps,
          const std::vector<RecentUpdate>& recent, const std::function<void(const std::string&)>& on_notice);
 
@@ -63,14 +63,14 @@ class RunLog {
   /// Sends a notice for the first update whose log-probabilities were recomputed.
   TrainProgress add(int64_t update, int64_t agent_steps, const UpdateRecord& record);
 
-  /// Writes the row and the event of an evaluation after `update` updates. Rates do not count its time.
+  /// Writes the row and the event of an evaluation after `update` updates. Rates exclude the evaluation's time.
   void add_evaluation(int64_t update, int64_t agent_steps, const EvaluationRecord& record);
   /// Whether evaluation.csv lacks a row after `update` updates; false without such a file.
   bool lacks_evaluation(int64_t update) const { return evaluation_csv_ && evaluation_csv_->last_update() != update; }
   /// Wall time of this process's evaluations.
   double evaluation_s() const { return evaluation_s_; }
 
-  /// Last updates, over which episode_return() is the mean.
+  /// Returns the last updates. episode_return() is a mean over them.
   std::vector<RecentUpdate> recent() const { return {recent_.begin(), recent_.end()}; }
   /// Mean over agent episodes that ended in the last updates; NaN before the first.
   double episode_return() const;
@@ -85,7 +85,7 @@ class RunLog {
   std::optional<ProgressCsv> evaluation_csv_;  // only if the run evaluates
   double evaluation_s_ = 0;
   std::deque<RecentUpdate> recent_;
-  // Agent-steps at a time of the run, evaluations excluded.
+  // Number of agent-steps at one time. The time excludes evaluations.
   struct Moment {
     double s;
     int64_t agent_steps;

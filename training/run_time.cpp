@@ -20,7 +20,7 @@ std::string RunTime::key(RunWork work) const {
 }
 
 bool RunTime::would_exceed_limit(RunWork work) const {
-  // 20 % longer than the longest so far, to allow for longer updates and for saving.
+  // The expected duration is 20 % more than the longest so far, to allow for longer updates and for saving.
   const auto longest = run_.longest_update_s.find(key(work));
   const double expected_s = longest == run_.longest_update_s.end() ? 0 : 1.2 * longest->second;
   return any_rank(minutes_ > 0 && expected_s > left_s(), run_.communicator);

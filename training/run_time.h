@@ -14,15 +14,15 @@ enum class RunWork { update, evaluation };
 
 class RunTime {
  public:
-  /// Limits the run to `minutes` of wall time since `start`; 0: no limit. Durations are stored in the run
-  /// (Run::longest_update_s), which must outlive this object, keyed by device and number of agents. They are known from
-  /// the first update if the run used the same device and number of agents before.
+  /// Limits the run to `minutes` of wall time since `start`; 0: no limit. Durations are stored in
+  /// Run::longest_update_s, by device and number of agents; the run must outlive this object. If the run used the same
+  /// device and number of agents before, durations are known from the start.
   RunTime(double minutes, const Stopwatch& start, Run* run);
 
-  /// Whether another piece of the work, as long as the longest so far, would exceed the limit on any rank. Collective:
-  /// every rank must call it.
+  /// Returns whether another update or evaluation would exceed the limit on any rank, if it took 20 % more time than
+  /// the longest so far. Collective: every rank must call it.
   bool would_exceed_limit(RunWork work) const;
-  /// Records the duration of work.
+  /// Records the duration of one update or evaluation.
   void add(RunWork work, double seconds);
   /// Scales the expected duration of work by `times`, until it is measured again.
   void scale_expected_duration(double times);

@@ -16,7 +16,7 @@ namespace pictura {
 
 namespace {
 
-/// First recorded place of a track; the track must have one.
+/// Returns the first recorded position of a track. The track must have one.
 Vec2 first_place(const CompiledMap& map, int32_t track) {
   const MapRecord& record = map.rules.record;
   const auto agent = static_cast<size_t>(track);
@@ -119,7 +119,7 @@ std::shared_ptr<const CompiledMap> SceneSets::compile(size_t scene, std::string*
 }
 
 SceneSet SceneSets::make(int64_t number) {
-  // Scene of each world; replaced by the next one until all can be used.
+  // Scene of each world. A scene that cannot be used is replaced by the next scene.
   std::vector<size_t> wanted;
   for (const WorldSpec& world : worlds_) {
     wanted.push_back(static_cast<size_t>(number * num_all_worlds_ + world.global_world) % scenes_.size());
@@ -170,7 +170,7 @@ SceneSet SceneSets::make(int64_t number) {
     set.worlds.push_back(worlds_[i]);
     set.worlds.back().map = index->second;
   }
-  // Sets draw different numbers, since each begins with episode 0.
+  // Each set needs another seed, because each set begins with episode 0.
   Hash64 hash;
   add_values(&hash, seed_, number);
   set.seed = number == 0 ? seed_ : hash.value();

@@ -17,8 +17,8 @@ namespace pictura {
 /// Compiles a scene for worlds of num_agents agents. Roles, starts and goals are those of evaluations
 /// (evaluation/scene_plan.h), see with_tracks(). Road users beyond num_agents follow their records. Replayed tracks
 /// beyond config.parked_cars are left out, those farthest from driven tracks first. `config` is the configuration of
-/// the worlds. Returns null if the protocol lets no road user be driven. Throws Error for scenes that cannot be read or
-/// simulated.
+/// the worlds. Returns null if the protocol allows no road user to be driven. Throws Error for scenes that cannot be
+/// read or simulated.
 std::shared_ptr<const CompiledMap> compile_training_scene(const SceneRef& scene, const SceneProtocol& protocol,
                                                           SimulatorConfig config, int num_agents);
 
@@ -35,7 +35,7 @@ struct SceneSet {
 /// background.
 class SceneSets {
  public:
-  /// Finds the scenes of simulator.maps. `worlds` are those of this rank, whose maps are ignored; `world` is their
+  /// Finds the scenes of simulator.maps. `worlds` are the worlds of this rank; their maps are ignored. `world` is their
   /// configuration. Throws Error if there is no scene.
   SceneSets(const Config& config, const SimulatorConfig& world, std::vector<WorldSpec> worlds, int num_all_worlds);
   ~SceneSets();
@@ -44,14 +44,14 @@ class SceneSets {
 
   /// Number of the set that worlds show after this number of updates.
   int64_t set_after(int64_t updates) const { return updates / updates_per_set_; }
-  /// Returns a set, waiting until it is prepared, and begins to prepare the next one. Throws Error if no scene can be
+  /// Waits until a set is prepared and returns it. Begins to prepare the next set. Throws Error if no scene can be
   /// used.
   SceneSet take(int64_t number);
   /// Returns the messages about scenes that were left out since the last call.
   std::vector<std::string> take_notices();
 
  private:
-  using Maps = std::map<size_t, std::shared_ptr<const CompiledMap>>;  // by the number of the scene
+  using Maps = std::map<size_t, std::shared_ptr<const CompiledMap>>;  // key: number of the scene
 
   SceneSet make(int64_t number);
   std::shared_ptr<const CompiledMap> compile(size_t scene, std::string* fault_out) const;
@@ -64,12 +64,12 @@ class SceneSets {
   const int num_agents_, num_threads_;
   std::vector<SceneRef> scenes_;
   std::vector<std::string> notices_;
-  // Members of the thread that prepares.
+  // Members that only the preparing thread uses:
   Maps maps_;                  // maps of the last prepared set
   std::set<size_t> unusable_;  // scenes that cannot be used
   std::vector<std::string> new_notices_;
   int64_t next_number_ = -1;
-  std::future<SceneSet> next_;  // set next_number_, if valid
+  std::future<SceneSet> next_;  // set number next_number_, if this is valid
 };
 
 }  // namespace pictura

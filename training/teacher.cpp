@@ -12,7 +12,7 @@ Teacher::Teacher(const SavedPolicy& saved, const Config& config, Device device)
       policy_(make_policy(saved.config, saved.rig, device)) {
   PICTURA_CHECK(!config_.reads_images(),
                 "{}: train.teacher: its policy reads images, expected a policy of the modality \"vector\"", saved.path);
-  // Policies with images do not read these slots; two policies with vectors would read the same slots.
+  // A learner with images does not read auxiliary slots. Two policies with vectors read the same slots.
   PICTURA_CHECK(config.reads_images() || config.policy.auxiliary == config_.policy.auxiliary,
                 "{}: train.teacher: its policy.auxiliary is {}, expected {}, as in the learner", saved.path,
                 config_.policy.auxiliary, config.policy.auxiliary);

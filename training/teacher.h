@@ -1,5 +1,5 @@
-// Teacher: a saved policy that the learner imitates while the learner drives. It gives its own action probabilities for
-// the learner's agents, from the observations of its training.
+// Teacher: a saved policy that the learner imitates while the learner drives. The teacher computes its own action
+// probabilities for the learner's agents, from the observations with which it was trained.
 #pragma once
 
 #include <memory>
@@ -12,13 +12,14 @@ namespace pictura {
 class Teacher {
  public:
   /// Creates the teacher of a learner of `config`, on `device`. Throws Error naming the teacher's file if it reads
-  /// images, or slots of the ego vector that the learner must not have.
+  /// images. Also throws if both policies read vectors and only one of them reads auxiliary slots (observed numbers
+  /// that no image shows).
   Teacher(const SavedPolicy& saved, const Config& config, Device device);
 
-  /// Adds the arrays that the teacher reads to those that a simulator writes.
+  /// Adds the observation arrays that the teacher reads to a simulator's configuration.
   void add_arrays(SimulatorConfig* config_inout) const;
 
-  /// Log-probabilities of all actions for the agents of these slots, i64 [n], from the simulator's present
+  /// Returns the log-probabilities of all actions for the agents of `slots`, i64 [n], from the simulator's current
   /// observations: f32 [n, kNumActions], without gradients.
   at::Tensor log_probs(const SimulatorArrays& input, const at::Tensor& slots) const;
 

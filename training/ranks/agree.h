@@ -12,13 +12,13 @@ namespace pictura {
 /// equal, as text.
 void check_equal_settings(const Config& config, const std::string& manner, Ranks* ranks);
 
-/// Whether `is_so` is true on any rank.
+/// Returns whether `is_so` is true on any rank.
 bool any_rank(bool is_so, Communicator* communicator);
 
-/// Whether any rank was interrupted. If so, this rank counts as interrupted too (common/support/interrupt.h).
+/// Returns whether any rank was interrupted. If so, this rank counts as interrupted too (common/support/interrupt.h).
 bool any_rank_interrupted(Communicator* communicator);
 
-/// Bytes of a checkpoint or of weights, read by the first rank only.
+/// Returns the bytes of a file of a checkpoint or of weights. Only rank 0 reads the file.
 std::string file_of_first(const std::string& path, Communicator* communicator);
 
 }  // namespace pictura

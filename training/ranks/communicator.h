@@ -1,4 +1,4 @@
-// Communicator of a run's ranks: sums, maxima and copies of tensors. Every rank gets the same bits.
+// Communicator of a run's ranks: sums, maxima and copies of tensors. Every rank gets bit-identical results.
 #pragma once
 
 #include <memory>
@@ -14,9 +14,10 @@ namespace pictura {
 
 class Ranks;
 
-/// Collective operations: all ranks make the same calls in the same order, with contiguous tensors of equal type and
-/// size: f32, f64, i32, i64 or u8, on the host or on the communicator's device. Results are in place; on a device no
-/// call waits for them. Throws RankLost, naming the rank, if a rank has ended or hangs.
+/// Collective operations: all ranks must make the same calls in the same order, with contiguous tensors of equal type
+/// and size. Types are f32, f64, i32, i64 and u8. Tensors are on the host or on the communicator's device. Results
+/// overwrite the tensors; on a GPU no call waits for results. Throws RankLost, naming the rank, if a rank has ended or
+/// hangs.
 class Communicator {
  public:
   virtual ~Communicator() = default;
@@ -32,27 +33,29 @@ class Communicator {
 
   virtual void sum(const at::Tensor& tensor) = 0;
   virtual void max(const at::Tensor& tensor) = 0;
-  /// Copies rank `root`'s tensor to all.
+  /// Copies rank `root`'s tensor to all ranks.
   virtual void broadcast(const at::Tensor& tensor, int root) = 0;
-  /// Heartbeat of this rank between calls that are far apart. Every rank must send the same number.
+  /// Sends a heartbeat of this rank, between calls that are far apart. Every rank must send the same number of
+  /// heartbeats.
   virtual void step() = 0;
 
-  /// Maximum of numbers on the host.
+  /// Returns the maximum over ranks of a number on the host.
   double max_of(double value);
-  /// Gathers the bytes of every rank, whose sizes may differ, in the order of ranks.
+  /// Returns the bytes of every rank, in the order of ranks. Their sizes may differ.
   std::vector<std::vector<uint8_t>> gather(const std::vector<uint8_t>& bytes);
   /// Returns rank 0's bytes.
   std::string from_first(const std::string& bytes);
 };
 
-/// Totals of the simulators of all ranks.
+/// Returns the totals of the simulators of all ranks.
 SimulatorTotals totals_of_all(SimulatorTotals own, Communicator* communicator);
 
-/// Communicator of a single process, which lives as long as the process.
+/// Returns the communicator of a single process. It exists as long as the process.
 Communicator* single_communicator();
 
-/// Creates the communicator of these ranks: single_communicator(), NCCL if they learn on CUDA devices, one each, or
-/// Gloo. Throws Error if this build or this machine lacks the library. `ranks` must outlive it.
+/// Creates the communicator of these ranks. A single rank uses single_communicator(). Several ranks use Gloo if they
+/// learn on hosts, or NCCL if they learn on CUDA devices, each on its own device. Throws Error if this build or this
+/// machine lacks the library. `ranks` must outlive it.
 std::unique_ptr<Communicator> make_communicator(Ranks* ranks, Device device);
 
 /// Creates a Gloo or NCCL communicator of any number of ranks.

@@ -32,8 +32,8 @@ class GlooCommunicator final : public Communicator {
     }
   }
   ~GlooCommunicator() override {
-    // The group's threads wait for the lost rank, and its destructor would wait for the threads. So the group is
-    // released at the end of the process.
+    // The group's threads wait for the lost rank, and its destructor would wait for the threads. So the group is not
+    // destroyed.
     if (has_failed_) static_cast<void>(group_.release());
   }
 

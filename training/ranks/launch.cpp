@@ -15,7 +15,7 @@ std::optional<std::string> variable(const char* name) {
   return text && *text ? std::optional<std::string>(text) : std::nullopt;
 }
 
-// Value of a variable that is an integer in [low, high]; `absent` if it is not set.
+// Returns the value of a variable that is an integer in [low, high]; `absent` if the variable is not set.
 std::optional<int> integer(const char* name, int low, int high, std::optional<int> absent = std::nullopt) {
   const std::optional<std::string> text = variable(name);
   if (!text) return absent;
@@ -33,7 +33,7 @@ struct Names {
   const char *rank, *size, *local_rank;
 };
 constexpr Names kTorchrun{"RANK", "WORLD_SIZE", "LOCAL_RANK"};
-// Only srun sets the number of tasks of a step: a batch script is not one of several processes.
+// Only srun sets SLURM_STEP_NUM_TASKS; a batch script without srun is a single process.
 constexpr Names kSlurm{"SLURM_PROCID", "SLURM_STEP_NUM_TASKS", "SLURM_LOCALID"};
 
 Launch place_by(const Names& names) {

@@ -11,7 +11,7 @@ struct Launch {
   int local_rank = 0;                 // index among the processes of its host
   std::string address = "127.0.0.1";  // host of rank 0, where the processes meet
   int port = 29500;                   // port at that address
-  bool is_served = false;             // the launcher listens there (torchrun); else rank 0 listens
+  bool is_served = false;             // whether the launcher (torchrun) listens at that port; else rank 0 listens
   std::string attempt;                // name of the launcher's attempt, which differs after a restart
 };
 
@@ -20,7 +20,7 @@ struct Launch {
 /// step. Without any of them there is one process. Throws Error naming a variable that is missing or invalid.
 Launch launch_from_environment();
 
-/// First host of a SLURM list: "node7" of "node[7-9,12],other".
+/// Returns the first host of a SLURM list: "node7" of "node[7-9,12],other".
 std::string first_slurm_host(const std::string& list);
 
 }  // namespace pictura

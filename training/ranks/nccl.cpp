@@ -71,7 +71,7 @@ class NcclCommunicator final : public Communicator {
     std::copy(first.begin(), first.end(), id.bytes);
     const c10::DeviceGuard guard(device_);
     check(nccl_.comm_init_rank(&comm_, size(), id, rank()), "ncclCommInitRank");
-    // Aborting ends kernels that wait for a lost rank, and so the calls that wait for these kernels.
+    // Aborting ends kernels that wait for a lost rank, and therefore also calls that wait for these kernels.
     ranks_->on_lost([this] {
       if (!is_aborted_.exchange(true)) nccl_.comm_abort(comm_);
     });

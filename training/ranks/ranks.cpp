@@ -21,7 +21,7 @@ using std::chrono::milliseconds;
 constexpr milliseconds kBetweenBeats{500};
 // Time limit of one request to the store, once all ranks have met there.
 constexpr milliseconds kStoreTimeout{20000};
-constexpr milliseconds kShutdownTimeout{5000};  // for the others to leave before the store closes
+constexpr milliseconds kShutdownTimeout{5000};  // for the other ranks to leave before the store closes
 
 milliseconds milliseconds_of(double seconds) { return milliseconds(static_cast<int64_t>(1000 * seconds)); }
 
@@ -110,12 +110,12 @@ Ranks::~Ranks() {
   changed_.notify_all();
   watcher_.join();
   if (rank() != 0 || launch_.is_served) return;
-  // Waits for the other ranks, which lose the store with this process.
+  // Waits for the other ranks, because the store ends with this process.
   try {
     const Clock::time_point end = Clock::now() + kShutdownTimeout;
     while (store_->add("left", 0) < size() && Clock::now() < end) std::this_thread::sleep_for(milliseconds(20));
   } catch (const c10::Error&) {
-    // The store is gone already, which no longer matters.
+    // The store has already ended, which no longer matters.
   }
 }
 
@@ -139,7 +139,7 @@ void Ranks::throw_if_lost() const {
 }
 
 void Ranks::announce(const std::string& why) noexcept {
-  // If a rank is lost, the store may be lost too, and the others know.
+  // If a rank is lost, the store may be lost too, and the other ranks know of the loss.
   if (size() == 1 || is_lost_) return;
   try {
     store_->compareSet(kFault, "", fmt::format("rank {} ended: {}", rank(), why));
@@ -190,7 +190,7 @@ struct Exchange {
   bool ends = false, has_ended = false;
   std::vector<std::vector<uint8_t>> values;  // values of the last round; empty before the first
   Clock::time_point last_round = Clock::now();
-  std::string error;  // reason why there are no more rounds
+  std::string error;  // why there are no more rounds
 
   void run(c10d::Store* store, const std::string& own_key, const std::vector<std::string>& keys) {
     std::unique_lock lock(mutex);
@@ -259,7 +259,7 @@ class BeatHistory {
  private:
   struct Seen {
     Beat beat;
-    Clock::time_point changed = Clock::now();  // time of the last change of its number
+    Clock::time_point changed = Clock::now();  // time of the last change of the heartbeat's number
   };
   double silent_s_;
   std::vector<Seen> seen_;
@@ -276,7 +276,7 @@ void Ranks::watch() {
   const auto exchange = std::make_shared<Exchange>();
   std::thread exchanges(
       [exchange, keys, own_key = keys[rank()], store = watch_store_] { exchange->run(store.get(), own_key, keys); });
-  // Returns the reason why a rank is lost, as far as it is known; empty: no rank is lost.
+  // Returns why a rank is lost, if that is known; empty: no rank is lost.
   const auto look = [&]() -> std::string {
     std::vector<std::vector<uint8_t>> values;
     {

@@ -1,5 +1,5 @@
-// Ranks: the processes of a training run. They meet in a key-value store, in which each rank writes heartbeats and
-// progress, and finds other ranks that ended or hang. Joint computations use a Communicator.
+// Ranks: the processes of a training run. They meet in a key-value store. Each rank writes heartbeats and its progress
+// to the store, and detects there whether other ranks ended or hang. Joint computations use a Communicator.
 #pragma once
 
 #include <atomic>
@@ -25,15 +25,15 @@ class RankLost : public Error {
 
 /// Time limits for other ranks.
 struct RankTimeouts {
-  double join_s = 300;        // until all ranks have joined
-  double silent_s = 20;       // without a heartbeat: the process was killed or stopped, or its host is gone
-  double no_progress_s = 45;  // with heartbeats, but without a step: the rank hangs; see Ranks::set_no_progress_s()
+  double join_s = 300;        // maximum time until all ranks have joined
+  double silent_s = 20;       // time without a heartbeat: the process was killed or stopped, or its host failed
+  double no_progress_s = 45;  // time with heartbeats but no step: the rank hangs; see Ranks::set_no_progress_s()
 };
 
 class Ranks {
  public:
-  /// Waits until all ranks have joined. Throws Error naming address and port if they cannot meet, the ranks that did
-  /// not join, and a rank that two processes claim.
+  /// Waits until all ranks have joined. Throws Error naming address and port if they cannot meet. Throws Error naming
+  /// ranks that did not join, or a rank that two processes claim.
   explicit Ranks(const Launch& launch, const RankTimeouts& timeouts = {});
   /// Waits briefly for the other ranks if this process hosts the store.
   ~Ranks();
@@ -44,18 +44,18 @@ class Ranks {
   int rank() const { return launch_.rank; }
   int size() const { return launch_.size; }
 
-  /// Counts a step of this process. All ranks must take equally many. Throws RankLost, naming the rank, if a rank is
-  /// lost.
+  /// Counts a step of this process. All ranks must take equally many steps. Throws RankLost, naming the rank, if a rank
+  /// is lost.
   void step();
   /// Throws RankLost as step() does, without counting a step.
   void check() const;
-  /// Waits until a lost rank is identified, after a collective operation has failed, and throws RankLost. Returns if no
-  /// rank is lost.
+  /// Call it after a collective operation has failed. Waits until the lost rank is identified, and throws RankLost.
+  /// Returns if no rank is lost.
   void throw_if_lost() const;
-  /// Announces the reason why this process ends to the other ranks. The first announcement counts.
+  /// Announces to the other ranks why this process ends. Only the first announcement counts.
   void announce(const std::string& why) noexcept;
 
-  /// Sets the time without a step after which a rank is considered to hang. For runs with long steps.
+  /// Sets the time without a step after which a rank is considered to hang. Runs with long steps need a longer time.
   void set_no_progress_s(double seconds) { no_progress_s_ = seconds; }
 
   /// Scope in which this process takes no step for long without being considered to hang.
@@ -70,7 +70,8 @@ class Ranks {
     Ranks* ranks_;
   };
 
-  /// Every rank's text under a key that is used once, in the order of ranks. Collective: every rank must call it.
+  /// Returns every rank's text `own`, in the order of ranks. Each key can be used only once. Collective: every rank
+  /// must call it.
   std::vector<std::string> texts(const std::string& key, const std::string& own);
 
   /// Store for process groups; null with a single rank.

@@ -5,7 +5,8 @@
 
 namespace pictura {
 
-/// CUDA graph of captured calls on a stream, with the addresses and arguments that they had at capture.
+/// CUDA graph of calls that were captured on a stream. The calls keep the addresses and arguments that they had at
+/// capture.
 class DeviceGraph {
  public:
   DeviceGraph() = default;

@@ -1,33 +1,31 @@
-// Generalized advantage estimation (Schulman et al., 2016) with next-step autoreset, over actions that may be held for
-// several steps: the recursion of one slot, from its last step to its first. Callers loop over slots and steps.
+// Generalized advantage estimation (Schulman et al., 2016) with next-step autoreset, for actions that may be held for
+// several steps. These are the steps of a recursion over one slot, from its last step to its first. Callers loop over
+// slots and steps.
 #pragma once
 
 #include "pictura/common/span.h"
 
 namespace pictura {
 
-/// Step of one agent.
-/// - A terminated step does not bootstrap.
-/// - A truncated step bootstraps from the value of the next row, which belongs to the final observation. The next call
-///   resets the world, and its transition is not valid. No advantage crosses the end of an episode.
-/// - An invalid step (its agent had halted, or its world was being reset) gets 0 and ends the recursion of earlier
-///   steps.
-/// - A step without a decision continues the previous step's action. It gets 0, and its reward is part of that
-///   decision's return.
+/// One step of one agent. - A terminated step does not bootstrap. - A truncated step bootstraps from the value of the
+/// next row, which belongs to the final observation. The next step resets the world, so its transition is not valid. No
+/// advantage crosses the end of an episode. - An invalid step (its agent had halted, or its world was being reset) has
+/// the advantage 0. Earlier steps bootstrap from its value. - A step without a decision continues the previous step's
+/// action. It has the advantage 0, and its reward is part of the return of the last decision.
 struct GaeTransition {
   float reward, value, next_value;
   bool is_terminated, is_truncated, is_valid, is_decision;
 };
 
-/// Tail of a slot after a step: the discounted rewards up to the next decision plus the value there, and the discounted
-/// advantage of that decision.
+/// Result of the recursion for the steps after a step. value: discounted rewards up to the next decision, plus the
+/// value there. advantage: discounted advantage of that decision.
 struct GaeTail {
   float value = 0, advantage = 0;
 };
 
-/// Returns the advantage of a step's decision, 0 if there is none, given the tail after the step; sets the tail to the
-/// tail after the previous step. Discounts by gamma each step, by gae_lambda each decision: an action held for k steps
-/// returns the sum of gamma^i r_i and bootstraps with gamma^k.
+/// Returns the advantage of a step's decision; 0 if the step has no decision. tail_inout: the tail after this step,
+/// which becomes the tail after the previous step. Each step discounts by gamma, each decision by gae_lambda. An action
+/// held for k steps returns the sum of gamma^i r_i and bootstraps with gamma^k.
 PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float gamma, float gae_lambda,
                                       GaeTail* tail_inout) {
   const bool goes_on = !transition.is_terminated && !transition.is_truncated;
@@ -60,7 +58,7 @@ struct TransitionArrays {
     return {rewards[i],        values[i],     values[i + static_cast<size_t>(num_slots)], terminated[i] != 0,
             truncated[i] != 0, valid[i] != 0, decides.empty() || decides[i] != 0};
   }
-  /// Tail after the last step.
+  /// Returns the tail after the last step.
   PICTURA_HD GaeTail tail(int64_t slot) const { return {values[num_steps * num_slots + slot], 0.0f}; }
 };
 

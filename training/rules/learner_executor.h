@@ -1,5 +1,5 @@
-// Executor of a learner's work outside its network: the rules of this folder over whole rollouts. The executors for the
-// host and for CUDA devices give the same bits.
+// Executor of a learner's work outside its network: it applies the rules of this folder to whole rollouts. The
+// executors for the host and for CUDA devices give bit-identical results.
 #pragma once
 
 #include "pictura/policy/rules/policy_executor.h"
@@ -14,7 +14,7 @@ class LearnerExecutor : public PolicyExecutor {
   /// Computes generalized advantages, see gae.h. advantages_out: [steps, slots].
   virtual void compute_advantages(const TransitionArrays& transitions, float gamma, float gae_lambda,
                                   Span<float> advantages_out, Stream stream = {}) = 0;
-  /// Adds the valid transitions to the bins of their |advantages|, see advantage_filter.h. counts_inout:
+  /// Counts the valid transitions in the bins of their |advantages|, see advantage_filter.h. counts_inout:
   /// [kNumFilterBins].
   virtual void count_advantages(Span<const float> advantages, Span<const uint8_t> valid, Span<int64_t> counts_inout,
                                 Stream stream = {}) = 0;

@@ -6,8 +6,8 @@
 
 namespace pictura {
 
-/// Permutation of [0, size): a Feistel network (Luby and Rackoff, 1988) over the next even number of bits, whose rounds
-/// draw from Philox, repeated until the result is below size.
+/// Permutation of [0, size) by a Feistel network (Luby and Rackoff, 1988). The network permutes numbers with an even
+/// number of bits, and its rounds draw random bits from Philox. It is repeated until the result is below size.
 struct Permutation {
   uint64_t seed = 0;
   uint32_t update = 0, epoch = 0;
@@ -22,7 +22,7 @@ struct Permutation {
     while ((int64_t{1} << (2 * half_bits)) < size) ++half_bits;
   }
 
-  /// Permuted position of element i, in [0, size). Takes fewer than four repetitions on average.
+  /// Returns the permuted position of element i, in [0, size). Needs fewer than four repetitions on average.
   PICTURA_HD int64_t operator()(int64_t i) const {
     auto element = static_cast<uint64_t>(i);
     do element = encrypted(element);
