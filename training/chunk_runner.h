@@ -18,7 +18,7 @@ struct Targets {
   at::Tensor actions;            // i64
   at::Tensor old_log_probs;      // log-probabilities of these actions
   at::Tensor returns;            // in units of rewards
-  at::Tensor teacher_log_probs;  // of all actions, [steps * slots, kNumActions]; undefined without a teacher
+  at::Tensor teacher_log_probs;  // for all actions, [steps * slots, kNumActions]; undefined without a teacher
   at::Tensor teacher_weight;     // scalar, weight of the KL divergence from the teacher; undefined without a teacher
 };
 

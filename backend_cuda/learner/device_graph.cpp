@@ -17,7 +17,8 @@ class CudaGraph final : public DeviceGraph {
  public:
   CudaGraph(Device device, cudaStream_t stream, const std::function<void()>& work) : device_(device) {
     const DeviceGuard guard(device_);
-    // Allocations and waits of this thread during the capture are errors. Other threads, such as NCCL's, may do so.
+    // Allocations and waits of this thread during the capture are errors. Other threads, such as NCCL's, may allocate
+    // and wait.
     PICTURA_CUDA(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal));
     cudaGraph_t graph = nullptr;
     try {

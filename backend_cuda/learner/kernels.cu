@@ -37,7 +37,7 @@ struct WriteCommand {
   __device__ void operator()(int64_t slot) const { write_command(actions, mask, slot, commands_out); }
 };
 
-// All steps of a slot, backwards. Neighbouring threads read neighbouring slots.
+// A thread processes all steps of a slot, from last to first. Neighbouring threads read neighbouring slots.
 struct ComputeAdvantages {
   TransitionArrays transitions;
   float gamma, gae_lambda;

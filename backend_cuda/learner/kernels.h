@@ -20,8 +20,9 @@ void launch_count_advantages(Span<const float> advantages, Span<const uint8_t> v
                              cudaStream_t stream);
 void launch_permute(const Permutation& permutation, Span<const int64_t> items, int64_t* items_out, cudaStream_t stream);
 
-/// The selected (asked or kept) indices in [0, count), in ascending order, and their number. If `scratch` is null, the
-/// functions only return the required scratch bytes.
+/// Rule of the transitions that the advantage filter keeps. Both select() functions write the indices in [0, count)
+/// that a rule selects, in ascending order, and their number. If `scratch` is null, they only return the required
+/// scratch bytes.
 struct KeptTransitions {
   Span<const float> advantages;
   Span<const uint8_t> valid;

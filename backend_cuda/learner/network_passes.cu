@@ -1,4 +1,5 @@
-// Passes of a network over its activations on a CUDA device: vectors of 16 bytes, and sums in fp32 in a fixed order.
+// Passes of a network over its activations on a CUDA device. Kernels load and store vectors of 16 bytes, and add in
+// fp32 in a fixed order.
 #include <type_traits>
 
 #include <cuda_bf16.h>
@@ -42,8 +43,8 @@ __global__ void __launch_bounds__(kThreads)
   reinterpret_cast<Vector*>(out)[i] = v;
 }
 
-// A thread processes a vector's channels of rows at a fixed stride; the sums of a block's threads are added in shared
-// memory.
+// A thread processes the channels of one vector, in rows at a fixed stride. The sums of a block's threads are added in
+// shared memory.
 template <typename T>
 __global__ void __launch_bounds__(kThreads)
     bias_gelu_backward(int64_t rows, int channels, const T* x, const float* bias, const T* grad_out, T* grad_x_out,
@@ -140,7 +141,7 @@ __device__ float normalize(WarpRow<kPairs>* row_inout) {
   return inverse_deviation;
 }
 
-/// Computes the gradient of a row from that of its normalize() result.
+/// Computes the gradient of a row from the gradient of its normalize() result.
 template <int kPairs>
 __device__ void normalize_backward(const WarpRow<kPairs>& normalized, float inverse_deviation,
                                    WarpRow<kPairs>* grad_inout) {
@@ -264,8 +265,8 @@ __global__ void __launch_bounds__(kThreads)
   out[row * width + column] = from_float<T>(value);
 }
 
-// Loads the row of a patch. `count` of its pixels lie in the image, and the others are black. Loads a row at once where
-// whole patches lie side by side, so that rows begin at multiples of their size.
+// Loads the row of a patch. `count` of its pixels lie in the image, and the others are black. If `is_aligned`, rows
+// begin at multiples of their size, and one load reads a whole row.
 template <int kPatch>
 __device__ void load_patch_row(const uint8_t* from, int count, bool is_aligned, uint8_t (&pixels_out)[kPatch]) {
   struct alignas(kPatch == 3 ? 1 : kPatch) Row {

@@ -1,5 +1,6 @@
 // Encoding of sets of members by an MLP to the largest embeddings of each set, and its backward pass, on tensor cores.
-// Values per member that ATen keeps in memory stay in registers. Products are in bf16, sums in fp32 in a fixed order.
+// Values per member stay in registers, whereas ATen would keep them in memory. Products are in bf16, sums in fp32 in a
+// fixed order.
 #include <cuda_bf16.h>
 
 #include "pictura/backend_cuda/learner/activation.cuh"
@@ -138,7 +139,7 @@ __device__ void normalize(Sums* rows_inout, float (&inverse_deviations_out)[2]) 
   rows_inout->each([&](int row, int, int, float& v) { v *= inverse_deviations_out[row]; });
 }
 
-/// Computes the gradient of rows from that of their normalize() result.
+/// Computes the gradient of rows from the gradient of their normalize() result.
 __device__ void normalize_backward(const Sums& normalized, const float (&inverse_deviations)[2], Sums* grads_inout) {
   float means[2] = {}, product_means[2] = {};
   grads_inout->each([&](int row, int n, int column, float& g) {
@@ -308,7 +309,7 @@ struct Chosen {
   uint8_t members[kChannels];
 
   /// Finds the chosen members from the members of the lane's two channels. places_out: the places of the two channels'
-  /// members, -1 without one. Returns the number of chosen members.
+  /// members; -1 if a channel has no member. Returns the number of chosen members.
   __device__ int find(const uint8_t (&which)[2], int max_members, int (&places_out)[2]) {
     int count = 0;
     places_out[0] = places_out[1] = -1;

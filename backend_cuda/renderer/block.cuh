@@ -31,8 +31,8 @@ struct Part {
   }
 };
 
-/// Drawing order of a tile whose fragments do not fit at once: vertical bands from left to right, each in parts from
-/// top to bottom.
+/// Drawing order of a tile whose fragments do not fit into memory together. The tile is divided into vertical bands,
+/// drawn from left to right; each band is drawn in parts from top to bottom.
 struct PartPlan {
   int band_begin, band_px;  // first column and width of the current band
   int wide_px, rows;        // maximum size of a part
@@ -50,19 +50,19 @@ struct WarpState {
   uint8_t owners[kWarpSize];
 };
 
-/// Shared state of a block. Always in shared memory, even if the rest of the block's memory is global.
+/// Shared state of a block. It is always in shared memory, even if the rest of the block's memory is global.
 struct BlockState {
   PreparedImage current;   // image that is being drawn
   PreparedImage upcoming;  // next image
   Scratch scratch;         // scratch memory of this block
   ScreenFace* faces;       // faces of the current image
   PolygonEdge* edges;      // edges of all images in the pool
-  // During culling and face set-up.
+  // Used during culling and face set-up:
   ViewState view;
   FaceSetupContext context;
   SetupCounts listed;
   int32_t num_entries, num_faces, num_clipped, overflow, usable;
-  // During drawing.
+  // Used during drawing:
   ImageEffect effect;  // effect on the current image
   int32_t num_rows, num_candidates, num_fragments, num_added, divides, num_composited, next_fragments, image;
   Part part, upcoming_part;
@@ -148,7 +148,7 @@ __device__ inline int32_t warp_allocate_one(int32_t* counter, bool wanted) {
 }
 
 // Returns the rank, among lanes with items, of the lane that owns item `first + lane_index()`. The items of all lanes
-// of a warp are numbered consecutively; those of a lane start at `begin`.
+// of a warp are numbered consecutively; the items of the calling lane start at `begin`.
 __device__ inline int owner_rank(int first, int begin, bool has_some) {
   const bool starts_here = has_some && begin >= first && begin < first + kWarpSize;
   const unsigned starts = __reduce_or_sync(kAllLanes, starts_here ? 1u << (begin - first) : 0u);
@@ -156,14 +156,14 @@ __device__ inline int owner_rank(int first, int begin, bool has_some) {
   return before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
 }
 
-// Balances load: each lane has `count` items, with inclusive prefix sum `end`. All lanes call visit(item, owner, k)
-// together, for 32 items at a time: the item's index in the warp, the lane that owns the item (-1: past the last item),
-// and the index among that lane's items.
+// Balances load among the lanes. Each lane has `count` items; `end` is the inclusive prefix sum of the counts. All
+// lanes call visit(item, owner, k) together, for 32 items at a time. item: index among the warp's items. owner: lane
+// that owns the item; -1 past the last item. k: index among the owner's items.
 template <typename Visit>
 __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& visit) {
   const int lane = lane_index(), begin = end - count;
   const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
-  // Lanes with items, compacted.
+  // Writes the lanes that have items, without gaps.
   const unsigned owning = __ballot_sync(kAllLanes, count > 0);
   if (count > 0) warp->owners[__popc(owning & lanes_below())] = static_cast<uint8_t>(lane);
   __syncwarp();
@@ -177,16 +177,17 @@ __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& 
   }
 }
 
-// Number of passes over a list. Neighbouring entries tend to be expensive together, so lanes take entries a stride
-// apart: in each pass a lane takes entry lane * passes + pass. Every warp has equally many passes.
+// Returns the number of passes over a list. Neighbouring entries tend to be equally expensive, so the lanes of a warp
+// take entries that are far apart: in a pass, a lane takes entry lane * passes + pass. Every warp has equally many
+// passes.
 template <int kThreads>
 __device__ inline int passes_of(int count) {
   const unsigned rounds = static_cast<unsigned>(count + kThreads - 1) / kThreads;
   return static_cast<int>(rounds) * (kThreads / kWarpSize);
 }
 
-// Compacts work within a warp: lanes push pairs; while is_ready(), take() gives one pair to every lane. At the end,
-// take() also gives out fewer than 32 pairs, and is_valid marks the lanes with a pair.
+// Queue that compacts work within a warp. Lanes push pairs. If is_ready(), take() returns one pair to every lane. At
+// the end, take() may return fewer than 32 pairs; is_valid is true in lanes with a pair.
 class WarpQueue {
  public:
   __device__ explicit WarpQueue(WarpQueueStorage* storage) : storage_(storage) {}

@@ -19,8 +19,8 @@ constexpr int kLaneCorners = 8;
 /// Shared memory of a warp that clips.
 struct ClipShared {
   Quad quad;  // quad of one lane, read by all lanes
-  // Corners: one column per lane, or the first row for the whole warp. Two additional rows, since a cut and a kept
-  // corner may be written past the last before the count is checked.
+  // Corners: each lane uses a column, or the whole warp uses the first row. There are two additional rows, because a
+  // cut and a kept corner may be written past the last row before the count is checked.
   static constexpr int kRows = kLaneCorners + 2;
   float x[kRows][kWarpSize], y[kRows][kWarpSize], z[kRows][kWarpSize];
   uint16_t edges[kLaneCorners * kWarpSize];  // see LaneEdge
@@ -109,7 +109,8 @@ __device__ inline float sum_in_order(float value) {
   return sum;
 }
 
-// Integers that sort like the floats with these bits; used for minimum and maximum over the lanes' values.
+// Returns an integer that sorts like the float with these bits. It is used for the minimum and maximum of the lanes'
+// values.
 __device__ inline int32_t sortable_bits(int32_t bits) { return bits ^ (bits >> 31 & 0x7FFFFFFF); }
 __device__ inline float warp_min(float value) {
   return __int_as_float(sortable_bits(__reduce_min_sync(kAllLanes, sortable_bits(__float_as_int(value)))));
@@ -118,7 +119,7 @@ __device__ inline float warp_max(float value) {
   return __int_as_float(sortable_bits(__reduce_max_sync(kAllLanes, sortable_bits(__float_as_int(value)))));
 }
 
-// Broadcasts the quad of lane `owner`, widened.
+// Broadcasts the quad of lane `owner` to all lanes, as a widened face.
 __device__ inline WarpFace broadcast_quad(const PinholeCamera& camera, ClipShared* storage, int owner,
                                           const Quad& quad) {
   __syncwarp();
@@ -132,7 +133,7 @@ __device__ inline WarpFace broadcast_quad(const PinholeCamera& camera, ClipShare
   return face;
 }
 
-// Makes the disk of a lit head; without corners if it has faded to black.
+// Makes the disk of a lit light head. The disk has no corners if it has faded to black.
 __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t index) {
   const LightHead head = context.heads[index];
   const PinholeCamera& camera = context.setting.camera;
@@ -142,8 +143,9 @@ __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t i
           light_ref(index)};
 }
 
-// Clips a lane's face of `count` corners in place, as clip_face does: at most one corner past the last read corner is
-// written. Returns the number of corners, or kTooManyCorners if they do not fit or the face is not exactly convex.
+// Clips a lane's face of `count` corners in place, as clip_face does. This is possible because at most one corner past
+// the last read corner is written. Returns the number of corners, or kTooManyCorners if they do not fit or the face is
+// not exactly convex.
 constexpr int kTooManyCorners = -1;
 __device__ inline int clip(const Frustum& f, unsigned crossed, int count, LaneCorners corners) {
   if (crossed == kOutside) return 0;

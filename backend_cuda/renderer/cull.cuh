@@ -1,5 +1,5 @@
 // Culling: a warp tests the rows of the map's grid, one lane per row, then the bounding spheres of the pieces in these
-// rows, one lane per piece. Entries that may be visible are stored in batches of warp size.
+// rows, one lane per piece. Objects that may be visible are stored as entries, in batches of warp size.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/draw_memory.cuh"
@@ -9,7 +9,7 @@ namespace pictura::cuda {
 
 constexpr uint32_t kNoEntry = ~0u;
 
-/// A side of the frustum's outline on the ground plane, from the end of lower y to that of higher y.
+/// A side of the frustum's outline on the ground plane. It leads from its end with lower y to its end with higher y.
 struct alignas(16) OutlineSide {
   Vec2 a, b;
   float dx_dy;  // 0 for sides of constant y
@@ -37,7 +37,7 @@ class EntryList {
     const int32_t index = warp_allocate_one(count_, wanted);
     if (wanted) set(index, entry);
   }
-  /// Pushes an entry for each set bit of `faces`, which are faces of an agent.
+  /// Pushes an entry for each set bit of `faces`, a mask of an agent's faces.
   __device__ void push_faces(unsigned faces, uint32_t object_id) {
     const int count = __popc(faces), end = warp_inclusive_sum(count);
     int32_t index = warp_allocate(count_, end) + end - count;
@@ -66,8 +66,8 @@ __device__ inline const PieceGrid& pieces_of(const DeviceGeometry& geometry, int
   return of_walls != 0 ? geometry.walls : geometry.strips;
 }
 
-// Returns the row or column at a distance from the grid's origin. Bounding spheres exceed their pieces by more than
-// rounding errors.
+// Returns the row or column at a distance from the grid's origin. Rounding does not matter, because bounding spheres
+// exceed their pieces by more than rounding errors.
 __device__ inline int cell_at(float distance_m, float cells_per_m, int count) {
   return clamp(static_cast<int>(floorf(distance_m * cells_per_m)), 0, count - 1);
 }
@@ -78,8 +78,8 @@ struct GridRows {
 };
 
 // Sets the outline: the four edges from the eye to the far corners, and the four edges between neighbouring corners. On
-// the ground these contain all sides of the convex hull. Collective over all lanes of the warp, one lane per side, for
-// strips and for walls.
+// the ground plane, these edges include all sides of the outline's convex hull. Collective over all lanes of the warp,
+// one lane per side, for strips and for walls.
 __device__ inline GridRows set_outline(CullShared* storage, const ImageSetting& setting,
                                        const DeviceGeometry& geometry) {
   const int side = lane_index() % kOutlineSides, of_walls = lane_index() / kOutlineSides & 1;
@@ -183,8 +183,8 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
     int item = warp_index() * kWarpSize;
     Candidate next;
     if (item < total) next = candidate_of(item);
-    // Software prefetch: the next candidates are loaded before the current ones are tested. Past the end, the last is
-    // loaded again.
+    // Software prefetch: the next candidates are loaded before the current ones are tested. Past the end, the last
+    // candidate is loaded again.
     PICTURA_NO_UNROLL
     while (item < total) {
       const Candidate candidate = next;

@@ -10,7 +10,7 @@ namespace pictura::cuda {
 // Blocks of face set-up: one warp each, as many as an SM can hold.
 constexpr int kSetupThreads = 32, kCullBlocksPerProcessor = 32, kFaceSetupBlocksPerProcessor = 32,
               kClipBlocksPerProcessor = 24;
-// Blocks that draw one tile at a time. A tile with more fragments is drawn in parts.
+// Blocks that draw one tile at a time. A tile with more than kDrawFragments fragments is drawn in parts.
 constexpr int kDrawThreads = 256, kDrawBlocksPerProcessor = 4;
 constexpr int kDrawPixels = kTileWidth_px * kTileHeight_px, kDrawFragments = 1152;
 // Few images are deferred, usually none.
@@ -21,8 +21,8 @@ constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFra
 // Bits of a 32-bit pixel word that hold a face, and the number of faces that they distinguish.
 constexpr int kMarkedFaceBits = 11, kMaxMarkedFaces = (1 << kMarkedFaceBits) - 1;
 
-/// Arrays of drawing, and its number of threads. Index: an index of a face, a pixel or a fragment; 16 bits where they
-/// suffice. Word: two indices.
+/// Arrays for drawing, and the number of threads. Index: type of an index of a face, a pixel or a fragment; 16 bits if
+/// they suffice. Word: type of a pair of indices.
 template <typename Index_, typename Word_, int kThreads_>
 struct DrawMemory {
   using Index = Index_;
@@ -43,12 +43,12 @@ struct DrawMemory {
   const ScreenFace* faces;   // faces of the image
   const PolygonEdge* edges;  // indexed by the faces' edge_begin
   Word* pixels;              // [max_pixels] of the current part, see PixelWord
-  Word* rows;                // [max_rows] of faces: face in the upper half, row of the part in the lower
-  Word* candidates;          // [max_candidates] possible fragments: face, pixel
+  Word* rows;                // [max_rows] rows of faces: face in the upper half, row of the part in the lower half
+  Word* candidates;          // [max_candidates] possible fragments: face in the upper half, pixel in the lower half
   // Fragments.
   uint32_t *samples_low, *samples_high, *visible_low, *visible_high;  // [max_fragments]
   float* area;                                                        // [max_fragments]
-  Index *face, *pixel, *next;  // [max_fragments] next: in the pixel's list, or kNone
+  Index *face, *pixel, *next;  // [max_fragments] next: next fragment in the pixel's list, or kNone
   Index* kind;                 // [max_fragments] kind of the weight; shares memory with `pixel`
   Index* composited;           // [max_fragments] pixels to be composited
   int32_t max_pixels, max_rows, max_candidates, max_fragments;

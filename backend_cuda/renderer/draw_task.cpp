@@ -22,7 +22,7 @@ SortedPieces::SortedPieces(const std::vector<WallFace>& walls) {
 
 void SortedPieces::sort(std::vector<Ball> balls) {
   constexpr float kCell_m = 16.0f;
-  // Exceeds the rounding errors of the searched ranges.
+  // Margin that exceeds the rounding errors of the ranges that queries search.
   constexpr float kLeeway_m = 0.1f;
   std::vector<Aabb2> middles;
   for (const Ball& ball : balls) {

@@ -1,4 +1,5 @@
-// Device-independent preparation: converts a call's arguments to the kernels' arguments, and sorts maps for culling.
+// Preparation of drawing on the host: converts a call's arguments to the kernels' arguments, and sorts the pieces of
+// maps for culling.
 #pragma once
 
 #include <string>

@@ -10,8 +10,8 @@
 
 namespace pictura::cuda {
 
-/// Values that a lane loads or stores, as words of 16 bytes. One word of padding avoids bank conflicts: there are none
-/// when each lane writes a word of its own row, and at most two-way conflicts when lanes read rows together.
+/// Values that a lane loads or stores, as words of 16 bytes. One word of padding avoids bank conflicts. Writes of one
+/// word per lane to its own row have no conflicts; joint reads of rows by several lanes have at most two-way conflicts.
 template <typename Value, int kValues = 1>
 struct LaneRow {
   static constexpr int kWords = kValues * sizeof(Value) / sizeof(uint4), kRowsAtOnce = kWarpSize / kWords;
@@ -37,16 +37,17 @@ union GeometryShared {
   ClipShared clip;
 };
 
-/// Shared memory of a block of pictura_setup_faces. With the 1 KiB that each block reserves, 32 blocks leave 28 KiB of
-/// L1 cache on an SM with 256 KiB for both. This is enough, because little of the data is read twice.
+/// Shared memory of a block of pictura_setup_faces. An SM has 256 KiB for shared memory and L1 cache. With the 1 KiB
+/// that CUDA reserves per block, 32 blocks leave 28 KiB of L1 cache. This is enough, because little of the data is read
+/// twice.
 struct FaceSetupState {
   FaceSetupContext contexts[2];  // contexts of this batch and the next, alternating
   FaceShared storage;
 };
 __device__ inline FaceSetupState* face_setup_state() { return reinterpret_cast<FaceSetupState*>(block_memory); }
 
-// Bytes of shared memory of a block that culls, and of a block that runs all stages; then a warp's part of the shared
-// memory of a block that runs all stages.
+// cull_bytes() and setup_bytes() return the bytes of shared memory of a block that culls, and of a block that runs all
+// stages. geometry_shared() returns the calling warp's part of the shared memory.
 __host__ __device__ constexpr size_t cull_bytes() { return state_bytes(kSetupThreads) + sizeof(CullShared); }
 __host__ __device__ constexpr size_t setup_bytes(int threads) {
   return state_bytes(threads) + static_cast<size_t>(threads / kWarpSize) * sizeof(GeometryShared);
@@ -55,8 +56,8 @@ __device__ inline GeometryShared* geometry_shared() {
   return reinterpret_cast<GeometryShared*>(block_memory + state_bytes(num_threads())) + warp_index();
 }
 
-// Loads the strips among the lanes' entries, with four lanes per strip and eight strips at once: if each lane loaded
-// its own strip, every sector would be requested several times. Collective over all lanes of the warp.
+// Loads the strips among the lanes' entries, with four lanes per strip and eight strips together. If each lane loaded
+// its own strip, every memory sector would be requested several times. Collective over all lanes of the warp.
 __device__ inline void load_strips(const FaceSetupContext& context, uint32_t entry, StripRow* rows_out) {
   const bool is_strip = kind_of(entry) == kStripKind;
   const unsigned strips = __ballot_sync(kAllLanes, is_strip);
@@ -75,8 +76,8 @@ __device__ inline void load_strips(const FaceSetupContext& context, uint32_t ent
   __syncwarp();
 }
 
-// Makes the face of an entry that is not a light; returns false if it has faded to black. strip_of(index) must return a
-// strip.
+// Makes the face of an entry that is not a light. Returns false if the face has faded to black. strip_of(index) must
+// return a strip.
 template <typename StripOf>
 __device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad* quad_out, StripOf&& strip_of) {
   const ImageSetting& setting = context.setting;
@@ -181,8 +182,8 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   store_rows(reinterpret_cast<uint4*>(context.faces + at), storage->faces, count);
 }
 
-// Sets up a face whose corners are distributed over the lanes. Returns false if its edges do not fit. Collective over
-// all lanes of the warp.
+// Sets up a face whose corners are distributed over the lanes. Returns false if the face's edges do not fit into
+// memory. Collective over all lanes of the warp.
 __device__ inline bool make_warp_face(const FaceSetupContext& context, ClipShared* storage, WarpFace warp_face) {
   clip(context.setting.frustum, storage, &warp_face);
   if (warp_face.count == 0) return true;
@@ -250,8 +251,9 @@ __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* 
   return fits;
 }
 
-// Clips the primitives of lanes with is_active and sets up their faces; primitive.image indexes contexts. Either all or
-// none are lights. Returns false in lanes whose edges do not fit. Collective over all lanes of the warp.
+// Clips the primitives of lanes with is_active and sets up their faces; primitive.image indexes contexts. Either all
+// primitives are lights, or none is a light. Returns false in lanes whose edges do not fit. Collective over all lanes
+// of the warp.
 __device__ inline bool clip_primitives(const FaceSetupContext* contexts, ClipShared* storage, bool is_active,
                                        bool are_lights, ClippedPrimitive primitive) {
   Quad quad;
@@ -286,7 +288,7 @@ __device__ inline ClippedItem clipped_item(const SetupLists& lists, const SetupC
 }
 
 // Sets the context of an image except for its outputs. Returns false and records a fault if its view refers to
-// something that does not exist. For one thread.
+// something that does not exist. Called by one thread.
 __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_t view, int32_t camera) {
   if (!set_view(&state->view, task, view)) return false;
   FaceSetupContext* context = &state->context;
@@ -318,7 +320,7 @@ class BestOccluders {
  public:
   __device__ explicit BestOccluders(FaceSetupContext* context) : context_(context) {}
 
-  /// Offers the entry's face of each lane with is_active. Collective over all lanes of the warp.
+  /// Adds the faces of the entries of lanes with is_active to the selection. Collective over all lanes of the warp.
   __device__ void add(bool is_active, uint32_t entry) {
     const ImageSetting& setting = context_->setting;
     const FaceSetupContext* context = context_;
@@ -342,7 +344,7 @@ class BestOccluders {
  private:
   struct Offered {
     uint32_t entry;
-    int area_bits = 0;  // bits of the area, in the same order; 0: occludes nothing
+    int area_bits = 0;  // bits of the area, which sort like areas; 0: occludes nothing
     ScreenQuad on_screen;
     bool is_clockwise = false;
   };

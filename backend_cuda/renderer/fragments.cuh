@@ -1,6 +1,6 @@
-// From the faces of an image to fragments. For each pixel, rows of faces find the fully covering face with the largest
-// occluder bound, and list the pixels that faces cover partly. Listed pixels that may be visible become fragments, one
-// thread each, in a linked list per pixel.
+// Conversion of an image's faces to fragments. Threads first process the rows of faces. They find, for each pixel, the
+// fully covering face with the largest occluder bound, and list the pixels that faces cover partly. Listed pixels that
+// may be visible become fragments, one thread each, in a linked list per pixel.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/draw_memory.cuh"
@@ -15,9 +15,10 @@ __device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px
   return {x, min_of(x + columns, width_px), y, min_of(y + rows, y_end)};
 }
 
-/// Word of a pixel. While full faces are searched, the upper bits hold the largest occluder bound, in an order of bits
-/// that sorts as the bound does; the lower bits hold the index of its face plus 1. From the pixel's first fragment on,
-/// the upper bits hold the first fragment of its list, and the sign bit is set. 0: no face and no fragment.
+/// Word of a pixel. While full faces are searched, the upper bits hold the largest occluder bound, as bits that sort
+/// like the bound. The lower bits hold the index of the bound's face plus 1. From the pixel's first fragment on, the
+/// upper bits hold the first fragment of its list, and the sign bit is set. The word is 0 without a face and a
+/// fragment.
 template <typename Word>
 struct PixelWord {
   static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
@@ -32,7 +33,7 @@ struct PixelWord {
     constexpr uint32_t kBoundMask = ~0u << kMarkedFaceBits;
     return float_from_bits(static_cast<uint32_t>(mark >> (kFaceBits - kMarkedFaceBits)) & kBoundMask);
   }
-  /// Replaces the first fragment of the list and keeps the face.
+  /// Returns the word with another first fragment of the list and the same face.
   __device__ static Word with_first(Word word, Word fragment) {
     return kHasFragments | fragment << kFaceBits | (word & kFace);
   }
@@ -96,8 +97,8 @@ __device__ void list_candidate(const Memory& memory, int index, int face, int pi
                              (covers_fully ? Memory::kCoversFully : Word{0});
 }
 
-// Marks a pixel that a face covers fully, unless its current face has a larger occluder bound. Of these two faces,
-// returns that with the lower bound if it may still be visible in front of the other, else -1.
+// Marks a pixel with a face that covers it fully, unless the pixel's current face has a larger occluder bound. Of these
+// two faces, returns the face with the lower bound if it may still be visible in front of the other face, else -1.
 template <typename Memory>
 __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixel) {
   using Word = typename Memory::Word;
@@ -111,8 +112,8 @@ __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixe
   return passes_occluder_bound(memory.faces[farther], bound, x, y) ? farther : -1;
 }
 
-// A row of a face within a tile: four columns relative to the tile, one byte each, so that one shuffle passes them to
-// another lane.
+// A row of a face within a tile. It consists of four columns relative to the tile. Each is one byte, so that one
+// shuffle passes all of them to another lane.
 static_assert(kTileWidth_px <= 255);
 struct TileSpan {
   uint32_t bytes = 0;
@@ -264,9 +265,9 @@ __device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wan
 }
 
 // Makes all effective samples of a fragment visible initially. A fragment that covers its pixel fully may intersect the
-// pixel's full face, which then becomes a fragment too. Lists the pixels to be composited: those with fragments that
-// are not alone. Records whether any pixel may have to be divided because several fragments cover it fully and another,
-// not a sliver, partly. Hardly any pixel has such fragments.
+// pixel's full face, which then becomes a fragment too. Lists the pixels to be composited, whose fragments are not
+// alone (is_alone()). Records whether any pixel's remainder may have to be divided: several fragments cover the pixel
+// fully, and another one, not a sliver, covers it partly. Hardly any pixel has such fragments.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;
@@ -292,8 +293,8 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     auto is_full = [](const PixelCoverage& coverage) { return coverage.is_full(); };
     auto hides = [](const PixelCoverage& coverage) { return !coverage.is_full() && coverage.samples != 0; };
     const Word first_of_list = first_of_word<Memory>(before);
-    // Among several full fragments, the first of the list finds the others behind it. Where the list begins with a face
-    // that another thread has added, that thread decides, because the list may not be linked yet.
+    // Among several full fragments, the first of the list finds the others behind it. If the list begins with a
+    // fragment that another thread has added, that thread decides, because the list may not be linked yet.
     if ((full != Memory::kNone || any_fragment(memory, Word{memory.next[i]}, is_full)) &&
         first_of_list < static_cast<Word>(count) && any_fragment(memory, first_of_list, hides)) {
       atomicOr(&memory.state->divides, 1);

@@ -9,7 +9,7 @@ namespace pictura::cuda {
 
 namespace {
 
-// Step of sizes: maps of about the same size reuse each other's memory.
+// Sizes are multiples of this step, so that maps of about the same size can reuse each other's memory.
 constexpr std::size_t kSizeStep_bytes = 64 << 10;
 constexpr std::size_t kAlignment_bytes = 256;
 
@@ -30,7 +30,7 @@ Slice<T> append(Span<const T> values, std::vector<std::byte>* bytes_inout) {
   return slice;
 }
 
-/// A kind of pieces, and the places of its arrays.
+/// Pieces of one kind, and the places of their arrays in a map's memory.
 struct PackedPieces {
   PieceGrid host;
   Slice<int32_t> begin, items;
@@ -110,7 +110,7 @@ void GeometryTable::swap_map(std::size_t index, Map* map_inout) {
     if (here < *max_inout && gone < *max_inout) return;
     *max_inout = here;
     if (here >= gone) return;
-    // Only where the maximum was removed, all maps are searched.
+    // All maps are searched only if the map with the maximum was removed.
     for (const Map& map : maps_) *max_inout = std::max(*max_inout, map.*count);
   };
   update(&Map::pieces, &max_pieces_);
@@ -126,7 +126,7 @@ void GeometryTable::grow(std::size_t entries, cudaStream_t stream) {
   PICTURA_CUDA(
       cudaMemcpyAsync(table.data(), host.data(), entries * sizeof(DeviceGeometry), cudaMemcpyHostToDevice, stream));
   PICTURA_CUDA(cudaStreamSynchronize(stream));
-  maps_.resize(entries);      // resized here, where failure is impossible: earlier failures leave both unchanged
+  maps_.resize(entries);      // cannot fail here; earlier failures leave both members unchanged
   table_ = std::move(table);  // frees the old table, which no work on the stream reads any more
   ++generation_;
 }
@@ -156,7 +156,8 @@ DeviceBuffer<std::byte> GeometryTable::allocate(std::size_t bytes) {
     retired_.erase(best);
     return memory;
   }
-  // At most as much memory as is in use is retained. Freeing may wait for the device, as allocation may.
+  // At most as much unused memory is retained as is in use. Freeing memory may wait for the device, and so may
+  // allocation.
   if (retired_bytes > held_bytes) std::erase_if(retired_, [](const Retired& each) { return each.has_passed(); });
   return DeviceBuffer<std::byte>(bytes);
 }

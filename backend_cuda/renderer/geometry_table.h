@@ -11,22 +11,23 @@
 
 namespace pictura::cuda {
 
-/// Table of maps. In all calls the table's device must be the current device, and handles must have been checked.
-/// Memory of replaced or released maps is kept until the stream has passed that call, and is then reused.
+/// Table of maps. In all calls the table's device must be the current device, and the caller must have checked the
+/// handles. Memory of a replaced or released map is kept until the stream has completed all earlier work, and is then
+/// reused.
 class GeometryTable {
  public:
   /// Copies an empty table to the device on the default stream.
   GeometryTable() { grow(kMinEntries, nullptr); }
 
-  /// Writes a map and its entry. Waits for the stream, so that the host's memory is free and the replaced map is no
-  /// longer read.
+  /// Writes a map and its entry. Waits for the stream. After that, the caller may free the host's copy, and no kernel
+  /// reads the replaced map any more.
   void upload(GeometryHandle handle, const StaticGeometry& geometry, cudaStream_t stream);
   /// Empties an entry, on the stream.
   void release(GeometryHandle handle, cudaStream_t stream);
 
   const DeviceGeometry* entries() const { return table_.data(); }
   int32_t num_entries() const { return static_cast<int32_t>(maps_.size()); }
-  /// Number of times that the table has moved.
+  /// Number of times that the table's address has changed.
   uint64_t generation() const { return generation_; }
   /// Maximum numbers of pieces and of light heads over all held maps.
   int max_pieces() const { return max_pieces_; }
@@ -43,7 +44,7 @@ class GeometryTable {
   struct DestroyEvent {
     void operator()(cudaEvent_t event) const { cudaEventDestroy(event); }
   };
-  /// Memory that is unused by the device after the event.
+  /// Memory that the device no longer uses after the event.
   struct Retired {
     DeviceBuffer<std::byte> memory;
     std::unique_ptr<std::remove_pointer_t<cudaEvent_t>, DestroyEvent> event;
@@ -56,10 +57,10 @@ class GeometryTable {
   void retire(DeviceBuffer<std::byte> memory, cudaStream_t stream);
   DeviceBuffer<std::byte> allocate(std::size_t bytes);
 
-  std::vector<Map> maps_;  // [handle], as many as entries of the table
+  std::vector<Map> maps_;  // [handle], one per entry of the table
   DeviceBuffer<DeviceGeometry> table_;
   std::vector<Retired> retired_;
-  int max_pieces_ = 0, max_heads_ = 0;  // cached for drawing calls: there are up to kNumGeometryHandles maps
+  int max_pieces_ = 0, max_heads_ = 0;  // cached, so that drawing calls need not search all maps
   uint64_t generation_ = 0;
 };
 

@@ -57,7 +57,7 @@ class HostRendererCuda final : public Renderer {
     check_queries(name(), scene, views, batch.size(), queries, visibility_out.size());
     const auto queue = static_cast<cudaStream_t>(stream.handle);
     const Span<float> result = visibility_.resize(queries.size());
-    // All views, so that queries about views beyond the count are answered.
+    // Passes all views, so that queries about views beyond the count are answered.
     const auto count = static_cast<int32_t>(views.size());
     const ViewBatch counted{views_.assign(batch.views, queue), count_.assign({&count, 1}, queue).data()};
     renderer_->visibility(scene_.assign(scene, queue), counted, queries_.assign(queries, queue), result, stream);

@@ -1,5 +1,6 @@
-// Lists of images: those drawn from the pool, most expensive first; those deferred until the pool is free; those that
-// overflow into the last launch. Allocates an image's memory in the pool.
+// Lists of images, and allocation of an image's memory in the pool. One list contains the images that are drawn from
+// the pool, the most expensive first. Another contains images that are deferred until the pool is free. The third
+// contains images that are left to the last launch.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/face_setup.cuh"
@@ -12,8 +13,8 @@ __device__ inline int32_t view_of(const DrawTask& task, int32_t image) {
 }
 __device__ inline int32_t camera_of(const DrawTask& task, int32_t image) { return image % num_cameras(task); }
 
-// Returns the number of the launch's views that are drawn: those within the caller's count. A count outside [0,
-// max_views] is a fault.
+// Returns the number of the launch's views that are drawn. Views beyond the caller's count are not drawn. A count
+// outside [0, max_views] is a fault.
 __device__ inline int32_t num_drawn_views(const DrawTask& task) {
   if (task.view_count == nullptr) return task.num_views;
   const int32_t count = *task.view_count, drawn = clamp(count, 0, task.max_views);
@@ -43,7 +44,7 @@ __device__ inline void list_drawn(const DrawTask& task, int32_t image, int32_t l
 class DrawOrder {
  public:
   __device__ explicit DrawOrder(const DrawTask& task) : task_(task) {}
-  /// Returns the image with this number, which must not decrease from call to call; -1 after the last.
+  /// Returns image number `turn` in this order; -1 after the last image. `turn` must not decrease from call to call.
   __device__ int32_t image_of(int32_t turn) {
     const int32_t* cost_buckets = task_.counters->cost_buckets;
     PICTURA_NO_UNROLL
@@ -62,7 +63,7 @@ class DrawOrder {
 };
 
 // Allocates the faces of an image with `listed` entries, and lists the image for drawing. Returns its first batch, or
-// -1 if the image was deferred or overflowed. For one thread.
+// -1 if the image was deferred or overflowed. Called by one thread.
 __device__ inline int32_t allocate_faces(const DrawTask& task, int32_t image, int32_t listed) {
   BlockState* state = block_state();
   FaceSetupContext* context = &state->context;

@@ -1,5 +1,5 @@
-// Writers of pixels as bytes, halves, floats or bfloat16s, in one plane per channel or as patches, several neighbours
-// per store; and a writer that writes nothing.
+// Writers of pixels. One writes bytes, halves, floats or bfloat16s, in one plane per channel or as patches, with
+// several neighbouring pixels per store. The other writes nothing.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/fragments.cuh"
@@ -18,7 +18,7 @@ struct ImageWriter {
   int width_px, height_px;
   int patch_px;  // side of the patches, if the order is patches
 
-  /// Stores the colour of a pixel with a fragment list in the first of its fragments.
+  /// Stores the colour of a pixel that has a fragment list. The colour is stored in the list's first fragment.
   template <typename Memory>
   __device__ void store_color(const Memory& memory, int fragment, Rgb color) const {
     if (has_bytes()) {
@@ -52,8 +52,8 @@ struct ImageWriter {
   struct Place {
     int x, y, count;
   };
-  // Returns the index of a place in patches. Constant divisors are several times as fast as patch_px, and all threads
-  // take one branch.
+  // Returns the index of a place in patches. Division by a constant is several times as fast as by patch_px, and all
+  // threads take the same branch.
   __device__ int64_t place_in_patch(const Place& place) const {
     switch (patch_px) {
       case 8: return place_in_patches(8, width_px, 0, place.x, place.y);
@@ -140,8 +140,8 @@ struct ImageWriter {
     if (is_right || place.y + 1 == height_px) blacken_beyond(image, place, width_px, height_px, patch_px);
   }
 
-  // Blackens the part of these pixels' patch that lies beyond the image, to the right and below. Not inlined: few
-  // threads need it, and all would reserve its registers.
+  // Blackens the part of these pixels' patch that lies beyond the image, to the right and below. It is not inlined,
+  // because few threads need it, but all would reserve its registers.
   template <typename Value>
   __device__ __noinline__ static void blacken_beyond(Value* image, Place place, int width_px, int height_px,
                                                      int patch_px) {

@@ -1,7 +1,7 @@
-// Arguments of the drawing kernels. Three launches (cull, set up, clip) prepare the faces of all images in a pool. The
-// next launch draws these images, one block per tile. A further launch draws the images that did not fit into the pool,
-// one block per image. Images that exceed a block's memory go to a last launch of few blocks, each with memory for a
-// whole world.
+// Arguments of the drawing kernels. Three launches (cull, set up, clip) prepare the faces of all images in a memory
+// pool. The next launch draws these images, one block per tile. A further launch draws the images that did not fit into
+// the pool, one block per image. Images that exceed a block's memory go to a last launch of few blocks, each with
+// memory for a whole world.
 #pragma once
 
 #include "pictura/common/patches.h"
@@ -10,15 +10,15 @@
 
 namespace pictura::cuda {
 
-/// Buckets of images by number of entries: images are drawn in order of decreasing cost, so that the last tiles are
-/// cheap.
+/// Images are sorted into buckets by their number of entries (objects that may be visible, see cull.cuh). Expensive
+/// images are drawn first, so that the last tiles are cheap.
 constexpr int kNumCostBuckets = 16, kFacesPerCostBucket = 64;
 
 /// Number of neighbouring pixels of a row that a thread writes with one store.
 constexpr int kPixelsPerWrite = 4;
 
-/// Maximum tile size. Tiles are higher than wide because distant primitives are concentrated along the horizon. They
-/// are narrower when there are few images, so that blocks end at about the same time.
+/// Maximum tile size. Tiles are higher than wide because distant primitives are concentrated along the horizon. Tiles
+/// are narrower if there are few images, so that blocks end at about the same time.
 constexpr int kTileWidth_px = 48, kNarrowTile_px = 32, kTileHeight_px = 54;
 /// Tiles of an image: equally wide, except for the last column.
 struct TileGrid {
@@ -31,7 +31,7 @@ PICTURA_HD constexpr TileGrid tiles_of(int max_px, int width_px, int height_px) 
   return {together, parts_of(width_px, together), parts_of(height_px, kTileHeight_px)};
 }
 
-/// Outputs of one camera's planes; null: not written.
+/// Outputs of one camera's optional planes. A plane with a null pointer is not written.
 struct CameraPlanes {
   float* depth_m = nullptr;
   uint8_t* class_id = nullptr;
@@ -42,7 +42,7 @@ struct CameraPlanes {
 /// A camera of the rig with derived values and its outputs; strides as in CameraImages.
 struct CameraSlot {
   PinholeCamera camera;  // in the ego frame
-  Frustum frustum;       // in camera coordinates, so independent of the pose, but not of a randomized focal length
+  Frustum frustum;       // in camera coordinates; depends on a randomized focal length, not on the pose
   TileGrid tiles;        // see choose_tiles
   void* color = nullptr;
   int64_t view_stride = 0;
@@ -55,15 +55,15 @@ struct alignas(16) Ball {
   float radius_m = 0;
 };
 
-/// All pieces of one kind of a map, each only in the cell of its sphere's centre: queries visit each piece once, and
-/// the pieces of neighbouring cells in a row are contiguous.
+/// Grid of all pieces of one kind (strips or walls) of a map. A piece is only in the cell of its sphere's centre.
+/// Therefore queries visit each piece once, and the pieces of neighbouring cells in a row are contiguous.
 struct PieceGrid {
   GridView cells;
   Span<const Ball> balls;  // in the order of cells.items
   float largest_radius_m = 0;
 };
 
-/// A map's static geometry in device memory; an entry of the renderer's table by handle.
+/// A map's static geometry in device memory. The renderer's table has one such entry per handle.
 struct DeviceGeometry {
   StaticGeometryView pieces;  // without its grids
   PieceGrid strips, walls;
@@ -76,8 +76,8 @@ inline DeviceGeometry empty_entry() {
   return entry;
 }
 
-/// A fault of a view or a query: the kernels write it, and the host throws it at the next call. One word, so that it is
-/// read and written atomically.
+/// Kind of a fault of a view or a query. Kernels write a fault, and the host throws it at the next call. A fault fits
+/// into one word, so that it is read and written atomically.
 enum class FaultKind : uint32_t {
   none,
   bad_world,
@@ -105,13 +105,13 @@ PICTURA_HD constexpr Fault fault_of(FaultWord word) {
 /// Face count of an image that is not in the pool; so low that increments by other warps leave it negative.
 constexpr int32_t kNotPrepared = -(1 << 30);
 
-/// An image that is ready to be drawn: its faces in the pool, and the data for the order of strips and solids. Copied
-/// as words, so it has no padding.
+/// An image that is ready to be drawn: its faces in the pool, and the data that determine whether solids stand on
+/// strips. The struct is copied as words, so it has no padding.
 struct PreparedImage {
   const DeviceGeometry* geometry = nullptr;
   const AgentBox* agents = nullptr;        // agents of its world
   int32_t face_begin = 0, face_count = 0;  // face_count may be kNotPrepared
-  int32_t has_overflowed = 0;              // 1: exceeded a block's memory while it was drawn
+  int32_t has_overflowed = 0;              // 1: the image exceeded a block's memory
   int32_t filler = 0;                      // pads to whole words
 };
 static_assert(sizeof(PreparedImage) == 2 * sizeof(void*) + 4 * sizeof(int32_t));
@@ -134,16 +134,17 @@ struct alignas(16) FaceSetupContext {
   const LightState* lights = nullptr;
   ScreenFace* faces = nullptr;
   PolygonEdge* edges = nullptr;
-  int32_t* num_faces = nullptr;    // written so far
-  int32_t* num_clipped = nullptr;  // edges of clipped faces; may exceed their range
-  int32_t edge_begin = 0;          // four per face
+  int32_t* num_faces = nullptr;    // number of faces written so far
+  int32_t* num_clipped = nullptr;  // number of edges of clipped faces; may exceed their range
+  int32_t edge_begin = 0;          // first edge of the faces, which have four edges each
   int32_t clipped_begin = 0, clipped_end = 0;
 };
 
 /// Maximum number of entries of an image that is drawn from the pool.
 constexpr int kMaxEntries = 1536;
 
-/// Entries of an image (backend_cuda/renderer/cull.cuh) whose faces a warp sets up at once, one per lane.
+/// Batch of entries of an image (objects that may be visible, see cull.cuh). A warp sets up the faces of a batch, one
+/// per lane.
 struct FaceBatch {
   static constexpr int kEntries = 32;
   /// Returns the number of batches of this number of entries; the last batch may be partly filled.
@@ -156,7 +157,7 @@ struct ClippedPrimitive {
   int32_t image;
 };
 
-/// Lists from each stage of face set-up to the next. Both have capacity for every visible entry.
+/// Lists that each stage of face set-up passes to the next. Both have capacity for every visible entry.
 struct SetupLists {
   uint32_t* entries = nullptr;          // [max_entries] per image, padded to whole batches
   ClippedPrimitive* clipped = nullptr;  // filled from both ends: faces at the front, lights at the back
@@ -173,12 +174,12 @@ struct FacePool {
   PolygonEdge* edges = nullptr;
   PreparedImage* images = nullptr;       // [images]
   FaceSetupContext* contexts = nullptr;  // [images]
-  FaceBatch* batches = nullptr;          // enough for max_faces in this number of images
+  FaceBatch* batches = nullptr;          // enough for max_faces faces in these images
   SetupLists lists;
-  int32_t max_faces = 0, max_edges = 0;  // edges: four per face, the rest for clipped faces
+  int32_t max_faces = 0, max_edges = 0;  // max_edges: four per face, the rest for clipped faces
 };
 
-/// Returns how many of at most max_blocks blocks can each set up an image in the pool's memory; at least one.
+/// Returns how many blocks can set up one image each in the pool's memory: at least one, at most max_blocks.
 PICTURA_HD inline int setup_blocks(const FacePool& pool, int max_blocks) {
   return min_of(pool.max_faces / kMaxEntries, max_blocks);
 }
@@ -203,13 +204,13 @@ struct DrawCounters {
 };
 
 struct DrawTask {
-  SceneBatch scene;                     // in device memory, like all pointers below
+  SceneBatch scene;                     // in device memory, as are the targets of all pointers below
   const View* views = nullptr;          // [max_views]
-  const int32_t* view_count = nullptr;  // number of drawn views; null: all
+  const int32_t* view_count = nullptr;  // number of views to draw; null: all
   int32_t max_views = 0;
   int32_t first_view = 0;  // this launch draws views [first_view, first_view + num_views)
   int32_t num_views = 0, num_cameras = 0;
-  int32_t max_tiles = 0;  // maximum over all images
+  int32_t max_tiles = 0;  // maximum number of tiles of an image
   const DeviceGeometry* geometries = nullptr;
   int32_t num_geometries = 0;
   float line_floor_px = 0;
@@ -230,7 +231,8 @@ struct DrawTask {
 
 /// Chooses the tile size from the number of drawing blocks.
 PICTURA_HD inline void choose_tiles(DrawTask* task, int blocks) {
-  // Wide tiles keep all threads busy; but with few tiles per block, blocks that end early would be idle.
+  // Wide tiles keep all threads busy. If there are few tiles per block, narrow tiles are better, because blocks that
+  // end early are idle.
   constexpr int kTilesOfBlock = 12;
   const int images = task->num_views * task->num_cameras;
   constexpr int kWidths_px[] = {kTileWidth_px, kNarrowTile_px};

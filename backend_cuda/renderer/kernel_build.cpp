@@ -39,7 +39,7 @@ SharedLibrary open_nvrtc() {
   }
 }
 
-// The used functions of NVRTC.
+// The functions of NVRTC that this file uses.
 struct Nvrtc {
   SharedLibrary library = open_nvrtc();
 #define PICTURA_NVRTC_FUNCTION(name) decltype(&::name) name = function<decltype(&::name)>(#name)
@@ -82,7 +82,7 @@ Compilation compilation_for(const Nvrtc& nvrtc, const KernelProgram& program, co
   nvrtc.check(nvrtc.nvrtcGetNumSupportedArchs(&count), "supported architectures");
   std::vector<int> known(static_cast<std::size_t>(count));
   nvrtc.check(nvrtc.nvrtcGetSupportedArchs(known.data()), "supported architectures");
-  // The newest architecture that the device can run; if it is older than the device, the driver compiles PTX.
+  // Finds the newest architecture that the device can run. If it is older than the device, the driver compiles PTX.
   int nearest = 0;
   for (const int each : known) {
     if (each <= target.compute_capability && each > nearest) nearest = each;
@@ -94,7 +94,7 @@ Compilation compilation_for(const Nvrtc& nvrtc, const KernelProgram& program, co
   compilation.architecture = fmt::format("{}_{}", compilation.is_cubin ? "sm" : "compute", nearest);
   compilation.options = {"--gpu-architecture=" + compilation.architecture,
                          "--std=c++20",
-                         "--fmad=false",     // no contraction, so that bits equal the CPU's
+                         "--fmad=false",     // no fused multiply-add, so that results are bit-identical to the CPU's
                          "-default-device",  // lambdas in kernels are device functions, as with nvcc
                          fmt::format("-DPICTURA_RIG_CAMERAS={}", target.num_cameras),
                          fmt::format("-DPICTURA_RIG_WIDTH_PX={}", target.width_px),

@@ -1,5 +1,5 @@
-// Kernels compiled at run time by NVRTC, for one architecture and one rig, and cached on disk. Needs no GPU, no driver
-// and no toolkit except NVRTC, which is opened on first use.
+// Kernels compiled at run time by NVRTC, for one architecture and one rig, and cached on disk. Compilation needs no
+// GPU, no driver and no toolkit except NVRTC, which is opened on first use.
 #pragma once
 
 #include <string>
@@ -13,22 +13,22 @@ namespace pictura::cuda {
 struct KernelTarget {
   int compute_capability = 0;       // 10 * major + minor
   int num_cameras = 0;              // number of the rig's cameras; 0: any
-  int width_px = 0, height_px = 0;  // if all cameras have the same size; 0: any
-  bool randomizes_cameras = true;   // false: RendererConfig::randomization is off
+  int width_px = 0, height_px = 0;  // size of all cameras' images, if it is equal; 0: any
+  bool randomizes_cameras = true;   // whether RendererConfig::randomization is on
 };
 
 struct KernelCode {
   std::string bytes;         // a cubin, or PTX if NVRTC is older than the architecture
   std::string architecture;  // sm_90, or compute_90 for PTX
-  bool cached = false;       // read from the cache
+  bool cached = false;       // whether the code was read from the cache
 };
 
 /// Returns an empty text if NVRTC can be opened, else the reason. $PICTURA_NVRTC is the path of the library to open, or
 /// `off`.
 std::string nvrtc_unavailable();
 
-/// Compiles a program, or reads the cached code of an earlier call with the same sources, target and version of NVRTC,
-/// unless the cached file is damaged. Throws Error with the compiler's messages, or if NVRTC cannot be opened.
+/// Compiles a program. If an earlier call had the same sources, target and version of NVRTC, reads its cached code
+/// instead, unless the cached file is damaged. Throws Error with the compiler's messages, or if NVRTC cannot be opened.
 KernelCode build_kernels(const KernelProgram& program, const KernelTarget& target);
 
 /// Returns the file in which build_kernels() caches the code. Empty if caching is off.

@@ -32,7 +32,7 @@ __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int3
   return true;
 }
 
-// Culls: lists the primitives of each image that may be visible, and allocates its faces. One warp per image.
+// Culls with one warp per image: lists the primitives that may be visible in the image, and allocates its faces.
 extern "C" __global__ void __launch_bounds__(kSetupThreads, kCullBlocksPerProcessor)
     pictura_cull(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
@@ -84,7 +84,7 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kFaceSetupBlocksPerP
   DrawCounters* counters = task.counters;
   const int32_t num_batches = counters->batches, num_blocks = static_cast<int32_t>(gridDim.x);
   // Batches take about equal time, so each block takes every num_blocks-th batch. While the warp sets up one batch, it
-  // loads the entries and the context of the next, and the descriptor of the one after.
+  // loads the entries and the context of the next batch, and the descriptor of the batch after the next.
   auto i = static_cast<int32_t>(blockIdx.x);
   auto batch_at = [&](int32_t at) { return at < num_batches ? task.pool.batches[at] : FaceBatch{}; };
   FaceBatch next = batch_at(i), after = batch_at(i + num_blocks);
@@ -118,7 +118,7 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kClipBlocksPerProces
   ClipShared* storage = &geometry_shared()->clip;
   DrawCounters* counters = task.counters;
   const SetupCounts listed = counters->listed;
-  // A warp takes only as many faces as spread the work over all warps, because each face is a long chain of dependent
+  // A warp takes so few faces that the work is spread over all warps, because each face is a long chain of dependent
   // instructions.
   const auto num_blocks = static_cast<int32_t>(gridDim.x);
   const int batch = clamp((listed.clipped + num_blocks - 1) / num_blocks, 1, kWarpSize);
@@ -134,7 +134,7 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kClipBlocksPerProces
   }
 }
 
-// Returns a tile of a camera's images; empty below the last row.
+// Returns a tile of a camera's images. Tiles below the last row are empty.
 __device__ inline Part tile_of(const CameraSlot& slot, int32_t tile) {
   const TileGrid& tiles = slot.tiles;
   const int height = height_px(slot.camera);
@@ -194,8 +194,8 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   }
 }
 
-// Sets up the faces of an image and draws it, in one block. Returns false if it does not fit, or if its view is
-// invalid. Collective over all threads of the block.
+// Sets up the faces of an image and draws it, in one block. Returns false if the image does not fit into memory, or if
+// its view is invalid. Collective over all threads of the block.
 template <typename Memory>
 __device__ bool prepare_and_draw(const DrawTask& task, int32_t image, const SetupTarget& target) {
   const int32_t view = view_of(task, image), camera = camera_of(task, image);
@@ -270,8 +270,8 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
     if (!is_view) fault(q, FaultKind::bad_query);
     PICTURA_NO_UNROLL
     for (int32_t camera = 0; is_view && view < num_drawn && camera < num_cameras(task.draw); ++camera) {
-      // Occlusion culling is off, since occluded faces count when the agent is drawn alone. set_view reports faults of
-      // the view.
+      // Occlusion culling is off, because occluded faces count when the agent is drawn alone. set_view reports faults
+      // of the view.
       if (!prepare_image(task.draw, view, camera, setup_target_of(state->scratch), false)) {
         if (state->usable != 0) fault(view, FaultKind::capacity_exceeded);
         continue;
@@ -284,7 +284,7 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
         fault(view, FaultKind::capacity_exceeded);
       }
     }
-    // Drawing is done, so its memory is free for the sums.
+    // Drawing is complete, so its memory is free for the sums.
     auto* of_thread = reinterpret_cast<int64_t*>(state->scratch.bytes);
     const VisibilitySum all{block_sum(of_thread, sum.among_all), block_sum(of_thread, sum.alone)};
     if (threadIdx.x == 0) task.visibility[q] = all.share();

@@ -1,4 +1,5 @@
-// From fragments to pixels: resolves the occlusion of each pair of fragments of a pixel, then composites each pixel.
+// Conversion of fragments to pixels: resolves the occlusion of each pair of fragments of a pixel, then composites each
+// pixel.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/fragments.cuh"
@@ -38,13 +39,13 @@ __device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
 }
 
 // Resolves occlusion between all pairs of fragments of a pixel, including its full face, except for pairs that can no
-// longer occlude each other. A lane walks the rest of the list after a fragment, one step at a time, and takes the next
-// fragment at its end. Fragments with the longest lists, which were made last, come first. Overlapping pairs are queued
-// until every lane of the warp has one.
+// longer occlude each other. A lane takes a fragment and walks the rest of the list after it, one step at a time. At
+// the end of the list, the lane takes another fragment. Fragments that were made last come first, because their lists
+// are longest. Overlapping pairs are queued until every lane of the warp has one.
 template <typename Memory>
 __device__ void resolve_occlusion(const Memory& memory, const Part& part, int count) {
   WarpQueue pairs(&memory.state->warps[warp_index()].queue);
-  int begin = 0, used = kWarpSize;  // the warp's block of fragments, and the number that are taken
+  int begin = 0, used = kWarpSize;  // first of the warp's current 32 fragments, and how many of these are taken
   int fragment = 0;
   uint32_t other = Memory::kNone;  // the next fragment of the list
   bool is_before_full = false;     // the pair with the full face comes first
@@ -236,8 +237,8 @@ __device__ bool draw_rows(const Memory& memory, const Part& part, const Visit& v
   return true;
 }
 
-// Draws the faces into one part and clears the memory for the next. Returns false, without clearing, if the part does
-// not fit. Collective over all threads of the block; the caller synchronizes before the next part.
+// Draws the faces into one part and clears the memory for the next part. Returns false, without clearing, if the part
+// does not fit into memory. Collective over all threads of the block; the caller synchronizes before the next part.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part, const Visit& visit,
                           const Write& write) {
@@ -267,7 +268,7 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
     if (columns == whole.num_columns() && rows == whole.num_rows()) plan = {whole.x_begin, columns, columns, rows};
     int x = part.x_begin, y = part.y_begin;
     if (is_drawn) {
-      // Along the row of parts, then down the band, then to the next band.
+      // The next part is in the same row of parts, else in the next row of the band, else in the next band.
       const int band_end = min_of(plan.band_begin + plan.band_px, whole.x_end);
       x = part.x_end;
       if (x == band_end) {
@@ -318,7 +319,8 @@ __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whol
   }
 }
 
-// Calls draw(memory, tile) for tiles of an image in sequence, as high as the memory allows, until a call returns false.
+// Calls draw(memory, tile) for the tiles of an image in sequence, until a call returns false. Tiles are as high as the
+// memory allows.
 template <typename Memory, typename Draw>
 __device__ bool for_each_tile(const Memory& memory, int width_px, int y_begin, int y_end, const Draw& draw) {
   const int max_rows = memory.max_pixels / kTileWidth_px;

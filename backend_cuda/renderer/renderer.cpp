@@ -24,8 +24,8 @@ namespace {
 
 // Number of blocks of the last launch.
 constexpr int kLargeBlocks = 8;
-// Maximum number of views that are drawn at once: large enough that the end of a launch, when few blocks still work,
-// takes a negligible share.
+// Maximum number of views that are drawn together. It is so large that the end of a launch, when only few blocks still
+// work, takes a negligible share of the time.
 constexpr std::size_t kViewsAtOnce = 2048;
 
 // Scratch memory, and the sizes of the largest calls for which it suffices.
@@ -44,7 +44,7 @@ class CudaRenderer final : public Renderer {
       : config_(check_config("cuda", config)), cameras_(pinhole_cameras(config.rig)), library_(config) {
     PICTURA_CUDA(cudaDeviceGetAttribute(&processors_, cudaDevAttrMultiProcessorCount, config.device.index));
     *origin_out = library_.origin();
-    ensure_capacity(0, 1);  // throws where the bound is too low for any scene
+    ensure_capacity(0, 1);  // throws if max_scratch_bytes is too low for any scene
     *fault_.host() = cuda::kNoFault;
     counters_.fill(0);
     PICTURA_CUDA(cudaDeviceSynchronize());  // the first call may be on any stream
@@ -87,7 +87,7 @@ class CudaRenderer final : public Renderer {
     const auto views_at_once = static_cast<int32_t>((views.size() + parts - 1) / parts);
     for (int32_t left = task.num_views; left > 0; left -= task.num_views, task.first_view += task.num_views) {
       task.num_views = std::min(left, views_at_once);
-      counters_are_clear_ = false;  // stays so if a launch fails
+      counters_are_clear_ = false;  // remains false if a launch fails
       PICTURA_CUDA(cuda::launch_draw(library_.kernels(), task, scratch_.large.view(), processors_, on_stream));
       counters_are_clear_ = true;
     }
@@ -143,9 +143,9 @@ class CudaRenderer final : public Renderer {
     counters_are_clear_ = true;
   }
 
-  // Allocates for as many views as the bound allows, and in the last launch for all primitives of a world, so that
-  // nothing is cut off. Does nothing where an earlier call needed as much. If it throws for lack of memory, the next
-  // call allocates again.
+  // Allocates memory for as many views as max_scratch_bytes allows, and in the last launch for all primitives of a
+  // world, so that no primitive is left out. Does nothing if an earlier call needed as much. If it throws for lack of
+  // memory, the next call allocates again.
   void ensure_capacity(std::size_t agents, std::size_t views) {
     agents = std::max(scratch_.agents, std::min(agents, static_cast<std::size_t>(kMaxBoxesPerWorld)));
     views = std::max({scratch_.views, std::size_t{1}, std::min(views, kViewsAtOnce)});
@@ -163,7 +163,7 @@ class CudaRenderer final : public Renderer {
                             .pool_bytes = cuda::kMinPoolBytes},
                            config_.max_scratch_bytes);
     large.blocks = plan.large_blocks;
-    // Freed before it is replaced, so that old and new memory are never allocated at the same time.
+    // The old memory is freed first, so that old and new memory are never allocated at the same time.
     scratch_ = ScratchMemory();
     ++scratch_generation_;
     ScratchMemory larger{agents, views, pieces, heads, plan, {}, {}};

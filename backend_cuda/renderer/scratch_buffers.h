@@ -7,8 +7,8 @@
 namespace pictura::cuda {
 
 /// Capacity of the pool per image, in faces and edges: the average need in CARLA's towns. Images that do not fit are
-/// drawn when the pool is free again. Four edges belong to each face. The other edges, of which a third is used, are
-/// for clipped faces.
+/// drawn when the pool is free again. Four edges belong to each face. The other edges are for clipped faces; about a
+/// third of these edges is used.
 constexpr std::size_t kPoolFaces = 200, kPoolEdges = 928;
 /// Additional capacity in images, for batches of few images that may all have many faces.
 constexpr std::size_t kMinPoolImages = 4 * kMaxEntries / kPoolFaces + 1;
@@ -17,7 +17,7 @@ static_assert(kMinPoolImages * kPoolFaces >= kMaxEntries, "a deferred image fits
 /// Capacities of a pool.
 struct PoolSizes {
   std::size_t images, faces, edges;
-  /// Enough batches for all faces; the last batch of each image may be partly filled.
+  /// Returns enough batches for all faces; the last batch of each image may be partly filled.
   constexpr std::size_t batches() const { return faces / FaceBatch::kEntries + images; }
   constexpr std::size_t entries() const { return images * kMaxEntries; }
   constexpr std::size_t listed_images() const { return (2 + kNumCostBuckets) * images; }
@@ -31,8 +31,8 @@ constexpr PoolSizes pool_sizes(std::size_t images) {
   const std::size_t num_allocations = images + kMinPoolImages;
   return {images, num_allocations * kPoolFaces, num_allocations * kPoolEdges};
 }
-/// Bytes of a pool per image, and without images. Their sum is sufficient, and too large by at most the bytes of a
-/// batch.
+/// Bytes of a pool per image, and bytes of a pool without images. Their sum over all images is sufficient; it is too
+/// large by at most the bytes of one FaceBatch.
 constexpr std::size_t kPoolImageBytes =
     (pool_sizes(FaceBatch::kEntries).bytes() - pool_sizes(0).bytes()) / FaceBatch::kEntries;
 constexpr std::size_t kMinPoolBytes = pool_sizes(0).bytes() + sizeof(FaceBatch);

@@ -58,7 +58,7 @@ class CudaRuleController final : public Controller {
   Device device_;
 };
 
-/// Drives by the actions that follow recordings, which are searched on the host and copied once.
+/// Drives by the actions that follow recordings. The host searches these actions and copies them to the device once.
 class CudaInverseController final : public Controller {
  public:
   explicit CudaInverseController(const Simulator& simulator) : device_(simulator.device()) {

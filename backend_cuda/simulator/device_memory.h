@@ -1,5 +1,5 @@
-// The simulator's device memory. Every array has the length of the simulator's capacity, so that other worlds within it
-// need no allocation. Copies are asynchronous on a stream.
+// The simulator's device memory. Every array has the length of the simulator's capacity, so that other worlds within
+// this capacity need no allocation. Copies are asynchronous on a stream.
 #pragma once
 
 #include <algorithm>
@@ -13,20 +13,20 @@
 
 namespace pictura {
 
-/// Copies from the host, whose memory may be reused on return.
+/// Copies from host memory, which the caller may reuse after the call.
 template <typename T>
 void put(const std::vector<T>& host, const DeviceBuffer<T>& device, cudaStream_t stream) {
   if (host.empty()) return;
   PICTURA_CUDA(cudaMemcpyAsync(device.data(), host.data(), host.size() * sizeof(T), cudaMemcpyHostToDevice, stream));
 }
-/// Copies to the host, as many elements as fit; they are valid after the stream has been waited for.
+/// Copies as many elements to the host as fit. They are valid after a wait for the stream.
 template <typename T>
 void get(const DeviceBuffer<T>& device, std::vector<T>* host_out, cudaStream_t stream) {
   if (host_out->empty()) return;
   PICTURA_CUDA(
       cudaMemcpyAsync(host_out->data(), device.data(), host_out->size() * sizeof(T), cudaMemcpyDeviceToHost, stream));
 }
-/// Copies within the device, as many elements as both hold.
+/// Copies within the device, as many elements as fit into both buffers.
 template <typename T>
 void copy(const DeviceBuffer<T>& from, const DeviceBuffer<T>& to, cudaStream_t stream) {
   const size_t count = std::min(from.size(), to.size());
@@ -34,7 +34,7 @@ void copy(const DeviceBuffer<T>& from, const DeviceBuffer<T>& to, cudaStream_t s
   PICTURA_CUDA(cudaMemcpyAsync(to.data(), from.data(), count * sizeof(T), cudaMemcpyDeviceToDevice, stream));
 }
 
-/// Agents' fields, by their names.
+/// Fields of the agents' state, with the names of AgentState.
 struct DeviceAgents {
 #define X(name, type, per_agent, first, comment) DeviceBuffer<type> name;
   PICTURA_AGENT_FIELDS(X)
@@ -67,7 +67,7 @@ struct DeviceAgents {
   }
 };
 
-/// State of the simulator, by the names of SimulatorState.
+/// State of the simulator, with the names of SimulatorState.
 struct DeviceState {
   DeviceAgents agents;
   DeviceBuffer<AgentBox> boxes, boxes_before;
@@ -101,15 +101,15 @@ struct DeviceState {
     agents.get_to(&host_out->agents, stream);
     SimulatorState::visit_arrays(*this, *host_out, [stream](const auto& from, auto& to) { get(from, &to, stream); });
   }
-  /// Copies as many elements as both hold: a snapshot has the size of its worlds, the simulator's own state the size of
-  /// its capacity.
+  /// Copies as many elements as fit into both. A snapshot has the size of its worlds; the simulator's own state has the
+  /// size of its capacity.
   void copy_to(const DeviceState& other, cudaStream_t stream) const {
     agents.copy_to(other.agents, stream);
     SimulatorState::visit_arrays(*this, other, [stream](const auto& from, const auto& to) { copy(from, to, stream); });
   }
 };
 
-/// Arrays of the rules of several maps, in one piece of memory.
+/// Arrays that rules read from several maps, in one block of memory.
 class DeviceMaps {
  public:
   DeviceMaps() = default;
@@ -210,7 +210,7 @@ struct DeviceResults {
     PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   }
-  /// Sets all rows to zero, because later only a set's rows up to its last count are zeroed.
+  /// Sets all rows to zero, because later writes zero a set's rows only up to the set's last count.
   void clear(cudaStream_t stream) const {
     const auto clear_one = [stream](const auto& buffer) {
       if (buffer.size() == 0) return;
@@ -243,7 +243,7 @@ struct DeviceScratch {
   DeviceBuffer<RuleOptions> options;
   DeviceBuffer<WorldView> worlds, next_worlds;
   DeviceBuffer<cuda::WorldScratch> of_worlds;
-  DeviceBuffer<int32_t> cell_begin, cell_items;  // the single cell of each world: {0, boxes}; and 0, 1, 2, ...
+  DeviceBuffer<int32_t> cell_begin, cell_items;  // single cell of each world: begins are {0, boxes}, items 0, 1, 2, ...
   DeviceBuffer<Vec2> cell_centers;
   DeviceBuffer<AgentBox> try_boxes;
   DeviceBuffer<uint32_t> free_tries;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kThreads = 128;  // per block
 constexpr int kTeamThreads =
-    kTurn * kThreadsPerAgent;  // a world's start is one long chain of work: as wide as its loops
+    kTurn * kThreadsPerAgent;  // as wide as the loops, because a world's start is one long chain of work
 
 struct DeviceAtomics {
   /// Returns the previous value.
@@ -139,7 +139,7 @@ __global__ void __launch_bounds__(kThreads) run_threads(int32_t count, Phase pha
   if (item < count) phase(DeviceAtomics{}, static_cast<int32_t>(item));
 }
 
-// Blocks per processor: with fewer registers than the compiler would choose, more waiting is hidden.
+// Blocks per multiprocessor. They leave fewer registers than the compiler would choose, but hide more latency.
 constexpr int kGroupBlocks = 5, kObserveBlocks = 16;
 
 template <int kGroup, typename Phase>
@@ -148,8 +148,8 @@ __global__ void __launch_bounds__(kThreads, kGroupBlocks) run_groups(int32_t cou
   if (item < count) phase(DeviceThreadGroup<kGroup>{}, static_cast<int32_t>(item));
 }
 
-/// Block size of groups with memory of their own. Blocks are small, since a block keeps its place until its last warp
-/// ends.
+/// Block size of groups with memory of their own. Blocks are small, because a block occupies its place on the
+/// multiprocessor until its last warp ends.
 constexpr int kObserveThreads = 64;
 template <typename Phase>
 __global__ void __launch_bounds__(kObserveThreads, kObserveBlocks) run_staged_groups(int32_t count, Phase phase) {
@@ -171,7 +171,7 @@ __global__ void __launch_bounds__(kTeamThreads) run_teams(int32_t count, Phase p
   }
 }
 
-/// Launcher of phases. Errors stay with the runtime until the caller reads the last one.
+/// Launcher of phases. The CUDA runtime keeps errors until the caller reads the last one.
 struct DeviceLaunch {
   StepStreams streams;
 
@@ -198,7 +198,8 @@ struct DeviceLaunch {
   }
   template <typename Phase>
   void teams(int32_t count, const Phase& phase) const {
-    // Not one block per world: a block of this size waits for a whole processor, even without work.
+    // There may be fewer blocks than worlds, because a block of this size waits for a whole multiprocessor, even
+    // without work.
     constexpr int32_t kMaxTeams = 128;
     run_teams<<<static_cast<unsigned>(min(count, kMaxTeams)), kTeamThreads, 0, streams.main>>>(count, phase);
   }

@@ -9,7 +9,8 @@
 
 namespace pictura::cuda {
 
-/// The caller's stream, and a second stream for work that may overlap, ordered by the events; a graph captures both.
+/// The caller's stream, and a second stream for work that may overlap. The events order both streams. A CUDA graph
+/// captures both.
 struct StepStreams {
   cudaStream_t main = nullptr, side = nullptr;
   cudaEvent_t forked = nullptr, joined = nullptr;
@@ -23,8 +24,8 @@ void launch_publish_restored(const PhaseArrays& arrays, const StepStreams& strea
 void launch_step(const PhaseArrays& arrays, const int32_t* actions, const StepStreams& streams);
 void launch_step(const PhaseArrays& arrays, const Command* commands, const StepStreams& streams);
 
-/// Launches commands by a rule of simulator/rules/control.h, for the slots of `mask` [slots], or for all slots if the
-/// mask is null.
+/// Launches a kernel that writes the commands of a rule of simulator/rules/control.h, for the slots of `mask` [slots],
+/// or for all slots if the mask is null.
 template <typename Rule>
 void launch_commands(const Rule& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
                      cudaStream_t stream);

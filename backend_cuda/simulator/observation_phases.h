@@ -10,7 +10,7 @@ namespace pictura::cuda {
 /// Writes observations of agents, one group of threads per observation.
 class ObservationWriter {
  public:
-  /// Number of floats that the rows of any set need in the memory of a group.
+  /// Maximum number of floats that the rows of one set need in a group's memory.
   static constexpr int kStaging = max_of(max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls) * kLaneFeatures,
                                          max_of(kMaxPartners* kPartnerFeatures, kMaxControls* kControlFeatures));
 

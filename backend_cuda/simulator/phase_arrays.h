@@ -10,7 +10,7 @@ namespace pictura::cuda {
 /// Number of threads that share an agent: about the number of lane segments, barriers and boxes to test.
 constexpr int kThreadsPerAgent = 8, kWarp = 32;
 
-/// A world's memory for spawning.
+/// A world's memory for spawning. A try is a candidate place of a box.
 struct WorldScratch {
   AgentBox* try_boxes = nullptr;   // [boxes, kSpawnTries] boxes of the free tries
   uint32_t* free_tries = nullptr;  // [boxes] bits of the known tries that are clear of all placed boxes
@@ -22,10 +22,10 @@ struct WorldScratch {
   int32_t *cell_begin = nullptr, *cell_items = nullptr;
 };
 
-/// Slot that marks "no slot with an action out of range". All its bytes are equal, for memset.
+/// Value that marks "no slot with an action out of range". All its bytes are equal, so that memset can write it.
 constexpr int32_t kNoSlot = 0x7F7F7F7F;
 
-/// All memory that the phases read and write, in one memory space.
+/// Addresses of all memory that the phases read and write, in one memory space.
 struct PhaseArrays {
   WorldView* worlds = nullptr;             // [num_worlds] box_cells: see one_cell() and is_crowd()
   WorldView* next_worlds = nullptr;        // [num_worlds] the same worlds, over memory for their next episode
@@ -35,14 +35,14 @@ struct PhaseArrays {
   // Agents of all worlds. The views also contain these pointers, but a kernel would read the pointers from a view again
   // after each store.
   AgentStateView agents{}, next_agents{};
-  // State, as in SimulatorState.
+  // State, with the names of SimulatorState:
   uint64_t* seed = nullptr;
   int32_t* episode_step = nullptr;
   int32_t* episode_index = nullptr;
   uint8_t* episode_over = nullptr;
   int32_t* spawned = nullptr;
   SimulatorTotals* world_totals = nullptr;
-  // Results.
+  // Results:
   StepArrays results;
   View* views = nullptr;
   uint8_t* driver = nullptr;
@@ -50,13 +50,13 @@ struct PhaseArrays {
   uint8_t entity_sets = 0;
   uint8_t has_lives = 0;            // whether some map has roads that end
   uint8_t has_replayed_tracks = 0;  // whether some map has replayed tracks
-  int32_t parked_per_world = 0;     // boxes of a world that belong to no agent
+  int32_t parked_per_world = 0;     // number of boxes of a world that belong to no agent
   uint8_t has_crowds = 0;           // whether some world is a crowd
-  // Between phases and steps.
-  uint8_t* began = nullptr;          // [num_worlds] an episode began in the last step: the next episode is to be made
-  uint8_t* prepares = nullptr;       // [num_worlds] whether that episode is made in the current step
-  int32_t* next_spawned = nullptr;   // [num_worlds] number of agents in the next episode
-  int32_t* rejected_slot = nullptr;  // lowest slot with a command out of range, or kNoSlot
+  // Values that phases and steps pass to later ones:
+  uint8_t* began = nullptr;     // [num_worlds] whether an episode began in the last step, so the next must be prepared
+  uint8_t* prepares = nullptr;  // [num_worlds] whether the next episode is prepared in the current step
+  int32_t* next_spawned = nullptr;      // [num_worlds] number of agents in the next episode
+  int32_t* rejected_slot = nullptr;     // lowest slot with a command out of range, or kNoSlot
   int64_t* rejected_command = nullptr;  // first rejected command since the host checked, or kNoRejection
   int32_t* first_element = nullptr;     // [num_slots] first element of an edit for the slot, or kNoSlot
   int32_t* faulty_element = nullptr;    // first element of the edit or the queries with a fault, or kNoSlot
@@ -77,23 +77,24 @@ struct PhaseArrays {
   PICTURA_HD bool has_rejected_command() const { return *rejected_slot != kNoSlot; }
 };
 
-/// Whether a world has so many boxes that they are sorted into cells.
+/// Returns whether a world has so many boxes that they are sorted into cells.
 PICTURA_HD constexpr bool is_crowd(int num_boxes) { return num_boxes > 512; }
 
-/// A world's boxes as one cell, unless they are a crowd: a warp tests all boxes faster than they could be sorted.
+/// Returns a grid of one cell with all boxes of a world that is no crowd. In such a world, a warp tests all boxes
+/// faster than it could sort them.
 PICTURA_HD inline GridView one_cell(Span<const int32_t> begin, Span<const int32_t> items) {
   constexpr float kWhole_m = 1e9f;
   return {{}, kWhole_m, 1, 1, begin, items};
 }
 
-/// A crowd's boxes in cells, at most as many cells as boxes.
+/// Returns the grid of a crowd's boxes, with at most as many cells as boxes.
 PICTURA_HD inline GridView crowd_cells(GridView cells, const int32_t* begin, Span<const int32_t> items) {
   cells.begin = {begin, static_cast<size_t>(cells.num_x * cells.num_y) + 1};
   cells.items = items;
   return cells;
 }
 
-/// Centre of a box in one cell: boxes that are not drawn are far from everything.
+/// Returns the centre of a box. The centre of a box that is not drawn is far from all other boxes.
 PICTURA_HD inline Vec2 center_of(const AgentBox& box) {
   constexpr float kNowhere_m = 1e9f;
   return box.drawn ? box.center_m.xy() : Vec2{kNowhere_m, kNowhere_m};

@@ -1,4 +1,5 @@
-// Phases that begin episodes: the first of a seed, and each next episode while the previous one continues.
+// Phases that begin episodes. The first episode of a seed begins immediately; each next episode is prepared while the
+// previous one continues.
 #pragma once
 
 #include "pictura/backend_cuda/simulator/observation_phases.h"
@@ -14,11 +15,12 @@ struct TeamMemory {
   int32_t lowest_changed;
 };
 
-/// Chooses a try for each of `count` boxes, which are the world's boxes from first_box on, and adds the placed boxes to
-/// the standing ones. The chosen try is the first that the map permits and that is clear of the boxes before it and of
-/// the standing boxes: the result of placing the boxes sequentially. As many boxes as the team has groups choose at the
-/// same time, given the last choices of the other boxes, until no choice changes. Then every choice agrees with the
-/// choices before it, which holds only for the sequential result. Every round fixes at least the lowest changed box.
+/// Chooses a try (a candidate place) for each of `count` boxes, which are the world's boxes from first_box on. Adds the
+/// placed boxes to the standing boxes. The chosen try is the first that the map permits and that is clear of the
+/// standing boxes and of all boxes with lower numbers. So the result equals that of placing the boxes one after the
+/// other. In a turn, kTurn boxes choose at the same time. In each round of a turn, every box that is not yet fixed
+/// chooses again, given the last choices of the other boxes, until no choice changes. Then every choice agrees with the
+/// choices before it, which is true only of the sequential result. Every round fixes at least the lowest changed box.
 /// Choices of an earlier turn do not change.
 ///   box_of_try(i, try), permits(group, i, try, box)
 template <typename Team, typename BoxOfTry, typename Permits>
@@ -32,7 +34,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
   int32_t* chosen_try = scratch.chosen_try + first_box;
   int32_t* next_try = scratch.next_try + first_box;
   int32_t& lowest_changed = team.memory().lowest_changed;
-  // The first tries of few boxes are evaluated together.
+  // If there are few boxes, several tries of each are evaluated together first.
   const int first_tries = clamp(kTurn / max_of(count, 1), 2, kSpawnTries);
   team.for_each(count, [&](int i) {
     boxes[i].drawn = 0;
@@ -40,7 +42,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
     known_tries[i] = 0;
     chosen_try[i] = -1;
   });
-  // Whether the map and the boxes that stood before this turn leave a try free.
+  // Returns whether the map permits a try and the try is clear of the boxes that stood before this turn.
   const auto evaluate_try = [&](const auto& group, int i, int t) {
     const AgentBox box = box_of_try(i, t);
     const bool is_free = is_clear(world, box, scratch.standing, group) && permits(group, i, t, box);
@@ -174,8 +176,9 @@ struct PlaceCenters {
   }
 };
 
-/// Phase that sorts the boxes of crowds into their cells, by counting: in all crowds, or in those whose boxes changed
-/// at the end of a step. The order within a cell is arbitrary, and rules do not depend on it.
+/// Phase that sorts the boxes of crowds (see is_crowd()) into cells by counting. If ends_step, it skips crowds whose
+/// boxes cannot have changed at the end of the step. The order within a cell is arbitrary, and rules do not depend on
+/// it.
 struct SortBoxes {
   PhaseArrays arrays;
   bool ends_step = false;
@@ -223,8 +226,8 @@ void launch_sort_boxes(const Launch& launch, const PhaseArrays& arrays, bool end
   if (arrays.has_crowds) launch.teams(arrays.num_worlds, SortBoxes{arrays, ends_step});
 }
 
-/// Phase that makes a world's next episode as soon as its memory is free and long before the episode is needed, since a
-/// start does not depend on steps.
+/// Phase that prepares a world's next episode as soon as the memory for it is free. This is possible long before the
+/// episode is needed, because its start does not depend on the steps before.
 struct PrepareEpisode {
   PhaseArrays arrays;
   template <typename Team>
@@ -234,7 +237,7 @@ struct PrepareEpisode {
   }
 };
 
-/// Launches episode 0 of `seed` in the worlds of the mask, or in all worlds if the mask is null.
+/// Launches the phases that begin episode 0 of `seed` in the worlds of the mask, or in all worlds if the mask is null.
 template <typename Launch>
 void launch_reset(const Launch& launch, const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed) {
   launch.teams(arrays.num_worlds, BeginFirstEpisode{arrays, mask, seed});

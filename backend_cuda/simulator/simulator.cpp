@@ -277,7 +277,7 @@ class SimulatorCuda final : public Simulator {
     put(std::vector<RuleOptions>{setup_.options}, scratch_.options, stream);
   }
 
-  /// Uploads the worlds' views for the rules, over device memory.
+  /// Uploads the views through which rules access the worlds. The views refer to device memory.
   void put_worlds(cudaStream_t stream) {
     std::vector<WorldView> worlds, next_worlds;
     std::vector<cuda::WorldScratch> of_worlds;
@@ -363,7 +363,7 @@ class SimulatorCuda final : public Simulator {
   SimulatorSetup setup_;
   SimulatorCapacity capacity_;
   WorldsToken worlds_token_;
-  mutable SimulatorState host_;  // the state, only after it has been copied there
+  mutable SimulatorState host_;  // the state, valid only after it has been copied to the host
   mutable SimulatorTotals totals_;
   DeviceMaps maps_;
   DeviceSetup tables_;

@@ -6,7 +6,8 @@
 
 namespace pictura::cuda {
 
-/// Phase that finds the lowest slot with a command out of range. Commands are actions or Commands, here and below.
+/// Phase that finds the lowest slot with a command out of range. CommandType is an action's int32_t or Command, here
+/// and below.
 template <typename CommandType>
 struct CheckCommands {
   PhaseArrays arrays;
@@ -46,7 +47,8 @@ struct Advance {
   }
 };
 
-/// Phase that moves a replayed track's box: box `index % parked_per_world` of a world's boxes that belong to no agent.
+/// Phase that moves the box of a replayed track: box number index % parked_per_world of the boxes that belong to no
+/// agent.
 struct ReplayTracks {
   PhaseArrays arrays;
   template <typename ThreadGroup>
@@ -76,8 +78,8 @@ struct ApplyRewardAndHalt {
   }
 };
 
-/// Phase that counts a world's step, advances its lights, and determines whether its episode is over; or that completes
-/// the move into its next episode.
+/// Phase that counts a world's step, advances its lights, and determines whether its episode is over. If the episode
+/// was already over, the phase instead completes the move into the next episode.
 template <typename CommandType>
 struct FinishStep {
   PhaseArrays arrays;
@@ -115,7 +117,7 @@ struct FinishStep {
     *arrays.rejected_command = rejected_command(*arrays.rejected_slot, commands[*arrays.rejected_slot]);
   }
 
-  /// Takes the parts of the next episode that belong to no agent.
+  /// Copies from the prepared next episode the boxes that belong to no agent, and the lights.
   template <typename ThreadGroup>
   PICTURA_HD void take_next(const ThreadGroup& group, int w) const {
     const WorldView world = arrays.world(w), next = arrays.next_world(w);
@@ -163,7 +165,7 @@ struct FinishStep {
     const auto skip = [](auto&, auto) {};
     for (SimulatorTotals& part : parts) {
       const auto add_count = [&group](int64_t& sum, int64_t count) {
-        sum += group.sum(static_cast<int>(count));  // at most a world's agents
+        sum += group.sum(static_cast<int>(count));  // at most the number of a world's agents
       };
       SimulatorTotals::visit(*sum_out, part, add_count, skip);
     }
