@@ -74,7 +74,7 @@ struct EvaluateReport {
 /// State shared by evaluations in the same worlds.
 struct EvaluationWorlds {
   CompiledMaps maps;             // EvaluateOptions::maps, compiled with the map options of the session's world
-  Renderer* renderer = nullptr;  // for the session\'s images, with maps under handles 0, 1, ...; null without images
+  Renderer* renderer = nullptr;  // for the session's images, with maps under handles 0, 1, ...; null without images
   std::unique_ptr<Simulator> simulator;  // created by the first evaluation
   std::string maps_hash;                 // value of EvaluationSetting::maps_hash; computed by the first evaluation
 };

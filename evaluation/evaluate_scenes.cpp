@@ -332,8 +332,8 @@ class BatchDrive {
     }
   }
 
-  /// Records the current poses as those after step `step`. Absent agents keep their last pose. Called with step 0 also
-  /// before the first step, so that every agent has a last pose.
+  /// Records the current poses as those after step `step`. Absent agents keep their last pose. A call with step 0
+  /// before the first step gives every agent an initial last pose.
   void record_poses(int step) {
     const std::vector<AgentBox> boxes = host_copy(simulator_.scene().agents, device());
     const auto steps = static_cast<size_t>(protocol_.steps), at = static_cast<size_t>(step);

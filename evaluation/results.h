@@ -89,7 +89,8 @@ struct EvaluationSetting {
   std::string policy_hash;  // hash of the policy's weights, or the controller's name
   std::vector<std::string> maps;
   // maps_hash: hash of the maps' roads, or of the bytes of recorded scenes' files. cameras_hash: hash of the poses and
-  // lenses of all cameras. Empty in files of earlier versions, and if not requested.
+  // lenses of all cameras. Both are empty in files of earlier versions. maps_hash is empty if not requested;
+  // cameras_hash is empty without images.
   std::string maps_hash, cameras_hash;
   std::map<std::string, std::string> config;  // see keys_of_evaluation(); empty in files of earlier versions
   int steps = 0;

@@ -26,7 +26,7 @@ struct ProbeOptions {
   int batch = 4096;                   // cases per call, rounded up to whole passes; affects only memory and time
 };
 
-/// Visits the options of all probes besides policies, worlds and devices.
+/// Visits the options of all probes except policies, worlds and devices.
 template <typename Visitor>
 void visit_options(ProbeOptions& probe, Visitor&& v) {
   EvaluateOptions& worlds = probe.worlds;

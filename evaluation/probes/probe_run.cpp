@@ -18,7 +18,7 @@ namespace pictura {
 
 namespace {
 
-// Sum of the probabilities of the actions of negative longitudinal jerk.
+// Returns the sum of the probabilities of actions with negative longitudinal jerk.
 float brake_probability(const float* logits) {
   const double largest = *std::max_element(logits, logits + kNumActions);
   double braking = 0, all = 0;
@@ -52,8 +52,8 @@ class SceneOnDevice {
   SceneBatch scene_;
 };
 
-// Name of a policy in figures: the name of its file, or of its run, since checkpoint files have the same names in all
-// runs.
+// Returns the name of a policy in figures: the name of its file, or the name of its run if it is a checkpoint, because
+// checkpoint files have the same names in all runs.
 std::string short_name(const std::string& path) {
   const std::filesystem::path absolute = std::filesystem::absolute(path);
   const std::string stem = absolute.stem().string();

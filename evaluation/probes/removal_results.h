@@ -62,7 +62,7 @@ constexpr float kDistanceBand_m = 10;
 struct RemovalRow : ResponseMeans {
   int policy = 0;
   RemovalGroup group;
-  double mean_occlusion = 0;  // mean over the cases; NaN outside frames
+  double mean_occlusion = 0;  // mean over the cases; NaN for users outside all frames
 };
 
 /// Returns the rows. For each policy, rows of all distances together come first, then rows of each distance band. Each
