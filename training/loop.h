@@ -15,7 +15,7 @@ namespace pictura {
 
 /// Work and time of one update.
 struct UpdateCost {
-  int64_t agent_steps = 0, slot_steps = 0;  // in the update's rollout
+  int64_t agent_steps = 0, slot_steps = 0;  // steps of active agents, and of all slots, in the rollout
   double kept_fraction = 0;                 // share of valid transitions that the filter keeps
   int64_t minibatches = 0;
   double first_kl = 0;                 // KL divergence in the first minibatch before parameters change, from rounding
@@ -48,7 +48,7 @@ struct TrainOptions {
   std::vector<std::string> overrides;  // for instance "train.updates=2"
   std::string out_folder;
   OldRun old_run = OldRun::refuse;
-  std::string init_from;  // checkpoint or safetensors of the same network that provides only initial weights
+  std::string init_from;  // checkpoint or safetensors of the same network, from which only weights are read
   double minutes = 0;     // wall-time limit, start-up included; the last update ends before it; 0: none
   std::string commit;     // commit of this program, for the metadata of policy.safetensors
   Launch launch;          // place of this process among the processes that train together
@@ -61,7 +61,7 @@ struct TrainOptions {
 };
 
 struct TrainReport {
-  // All members are over all ranks, except device_bytes and peak_tensor_bytes.
+  // Work of all ranks: from here to km_driven.
   int64_t agent_steps = 0, updates = 0;
   double agent_steps_per_s = 0, episode_return = 0, km_driven = 0;
   int ranks = 1;
@@ -80,15 +80,18 @@ class OutOfMemory : public Error {
   using Error::Error;
 };
 
-/// Trains with the given configuration and writes into out_folder: config.toml (resolved), untrained.ckpt (the policy
-/// before its first update), checkpoint.ckpt, older checkpoints and milestones as specified by train.keep_checkpoints
-/// and train.milestone_agent_steps, policy.safetensors, policy_average.safetensors if train.weight_average is set,
-/// progress.csv, evaluation.csv if train.evaluate_every is set, and TensorBoard events. After an interrupt
-/// (common/support/interrupt.h) it saves and returns with `interrupted`. It returns with `out_of_time` if another
-/// update would not end within `minutes`. The expected duration is that of the longest update of this process. Before
-/// the first update it is that of an earlier process, if that used a device of the same product and the same number of
-/// agents. Throws Error naming file and key for bad input. Throws Error naming the folder if another run is active in
-/// it, or if it holds a run and old_run is `refuse`. Throws OutOfMemory if the device's memory is too small.
+/// Trains with the given configuration. Writes the following files into out_folder:
+/// - config.toml: the resolved configuration
+/// - untrained.ckpt: the policy before its first update
+/// - checkpoint.ckpt, older checkpoints (train.keep_checkpoints) and milestones (train.milestone_agent_steps)
+/// - policy.safetensors, and policy_average.safetensors if train.weight_average is set
+/// - progress.csv, evaluation.csv if train.evaluate_every is set, and TensorBoard events
+/// After an interrupt (common/support/interrupt.h) the function saves and returns with `interrupted`. It returns with
+/// `out_of_time` if another update would not end within `minutes`. The expected duration is that of the longest update
+/// of this process. Before the first update it is that of an earlier process, if that used a device of the same product
+/// and the same number of agents. Throws Error naming file and key for bad input. Throws Error naming the folder if
+/// another run is active in it, or if it holds a run and old_run is `refuse`. Throws OutOfMemory if the device's memory
+/// is too small.
 ///
 /// Several processes train one policy if each calls this function with its `launch` and equal settings. Rank 0 alone
 /// reads and writes files. An interrupt of one process ends all processes after the same update. If a rank fails, ends

@@ -40,8 +40,8 @@ struct MapMemory {
   double host = 0;    // maps as loaded, with the data for rules and renderers
   double device = 0;  // data for rules and renderers, on a device
 };
-/// Estimates the memory of maps from the sizes of their files and towns. names: names as in training_maps(). The
-/// estimate is rarely too small. Throws as map_file_bytes() does.
+/// Estimates the memory of maps from the sizes of their files and towns. names: names of maps as training_maps()
+/// returns them. The estimate is rarely too small. Throws as map_file_bytes() does.
 MapMemory estimated_map_memory(const std::vector<std::string>& names);
 
 /// Throws Error if a run's maps do not fit into memory; the error gives the number of maps that would fit. Maps, agents

@@ -32,8 +32,8 @@ struct Run {
   SavedPolicy saved_policy() const;
   /// Returns the policy with averaged weights; only for runs that average them.
   SavedPolicy averaged_policy() const;
-  /// Returns the contents of a checkpoint at the start of an update. Collective over all ranks; rank 0 writes it, and
-  /// the results of other ranks contain no simulator.
+  /// Returns the contents of a checkpoint at the start of an update. Collective over all ranks. Only rank 0's result
+  /// may be written to a file, because the results of other ranks contain no simulator state.
   Checkpoint checkpoint(const std::vector<RecentUpdate>& recent) const;
   /// Resumes from a checkpoint of any number of ranks. The simulator cannot read its saved state if its rules or maps
   /// have changed since. New episodes then begin, and the return value states the reason; else it is empty. Moments of

@@ -32,13 +32,13 @@ class RunKeeper {
   bool is_due(const Run& run) const;
   /// Saves the run as checkpoint.ckpt and keeps older checkpoints. Does nothing if this update is already saved.
   void save(const Run& run, const std::vector<RecentUpdate>& recent);
-  /// Saves the run under another name in the folder, which later saves do not touch.
+  /// Saves the run under another name in the folder. Later saves do not touch this file.
   void save_as(const std::string& name, const Run& run, const std::vector<RecentUpdate>& recent) const;
   /// Writes the weights as policy.safetensors, and their average, if there is one, as policy_average.safetensors.
   void write_weights(const Run& run) const;
 
-  /// Folder of the run's files: options.out_folder. If the run overwrites another run, a folder in options.out_folder
-  /// until the first checkpoint.
+  /// Returns the folder of the run's files, which is options.out_folder. If the run overwrites another run, it is a
+  /// folder within options.out_folder until the first checkpoint.
   const std::string& folder() const { return folder_; }
   std::string path(const std::string& name) const { return folder_ + "/" + name; }
   std::string checkpoint_path() const { return path("checkpoint.ckpt"); }

@@ -15,9 +15,10 @@ struct Launch {
   std::string attempt;                // name of the launcher's attempt, which differs after a restart
 };
 
-/// Reads the launch from RANK, WORLD_SIZE, LOCAL_RANK (default: RANK), MASTER_ADDR (127.0.0.1) and MASTER_PORT (29500),
-/// as torchrun sets them, or from the variables of SLURM's srun, where MASTER_ADDR defaults to the first host of the
-/// step. Without any of them there is one process. Throws Error naming a variable that is missing or invalid.
+/// Reads the launch from the variables that torchrun sets: RANK, WORLD_SIZE, LOCAL_RANK (default: RANK), MASTER_ADDR
+/// (127.0.0.1) and MASTER_PORT (29500). Otherwise reads it from the variables of SLURM's srun; MASTER_ADDR then
+/// defaults to the first host of the step. Without all these variables there is one process. Throws Error naming a
+/// variable that is missing or invalid.
 Launch launch_from_environment();
 
 /// Returns the first host of a SLURM list: "node7" of "node[7-9,12],other".

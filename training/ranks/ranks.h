@@ -76,8 +76,8 @@ class Ranks {
 
   /// Store for process groups; null with a single rank.
   const c10::intrusive_ptr<c10d::Store>& store() const { return store_; }
-  /// Sets the function that is called from another thread when a rank is lost, so that waiting calls end. One function
-  /// at a time; empty: none.
+  /// Sets the function that is called from another thread when a rank is lost, so that waiting calls end. It replaces
+  /// the previous function; an empty function removes it.
   void on_lost(std::function<void()> abort);
 
  private:
