@@ -245,7 +245,7 @@ __global__ void __launch_bounds__(kThreads)
     position_sums.each([&](int k, float sum) { return sum + grad.values[k]; });
     grad.store(grad_x_out + row * kChannels);
   }
-  // Warp index = (sum, position), since the stride is a multiple of the period.
+  // Warp index = (sum, position), because the stride is a multiple of the period.
   float* const sums = sums_out + warp * 3 * kChannels;
   position_sums.store(sums);
   weight_sums.store(sums + kChannels);

@@ -13,10 +13,10 @@ namespace {
 using Half = __nv_bfloat16;
 
 constexpr int kWarps = 4, kThreads = kWarps * kWarp;
-constexpr int kTile = 16;  // number of members that a warp processes at once
+constexpr int kTile = 16;  // number of members that a warp processes together
 constexpr int kChannels = SetSize::kChannels, kInputs = SetSize::kMaxWidth;
 constexpr int kColumnTiles = kChannels / 8;
-// Strides of rows in shared memory, such that the rows that a warp reads together lie in different banks.
+// Strides of rows in shared memory. With these strides, rows that a warp reads together are in different banks.
 constexpr int kInputStride = kInputs + 8, kChannelStride = kChannels + 8;
 
 __device__ int lane() { return static_cast<int>(threadIdx.x) % kWarp; }

@@ -7,7 +7,7 @@
 
 namespace pictura::cuda {
 
-// Blocks of face set-up: one warp each, as many as an SM can hold.
+// Blocks of face set-up have one warp each. As many run on an SM as it can hold.
 constexpr int kSetupThreads = 32, kCullBlocksPerProcessor = 32, kFaceSetupBlocksPerProcessor = 32,
               kClipBlocksPerProcessor = 24;
 // Blocks that draw one tile at a time. A tile with more than kDrawFragments fragments is drawn in parts.
@@ -18,7 +18,7 @@ constexpr int kDeferredBlocksPerProcessor = 2;
 // Blocks of the last launch.
 constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 16;
 
-// Bits of a 32-bit pixel word that hold a face, and the number of faces that they distinguish.
+// Number of bits of a 32-bit pixel word that hold a face, and number of faces that these bits can distinguish.
 constexpr int kMarkedFaceBits = 11, kMaxMarkedFaces = (1 << kMarkedFaceBits) - 1;
 
 /// Arrays for drawing, and the number of threads. Index: type of an index of a face, a pixel or a fragment; 16 bits if
@@ -45,7 +45,7 @@ struct DrawMemory {
   Word* pixels;              // [max_pixels] of the current part, see PixelWord
   Word* rows;                // [max_rows] rows of faces: face in the upper half, row of the part in the lower half
   Word* candidates;          // [max_candidates] possible fragments: face in the upper half, pixel in the lower half
-  // Fragments.
+  // Arrays of fragments:
   uint32_t *samples_low, *samples_high, *visible_low, *visible_high;  // [max_fragments]
   float* area;                                                        // [max_fragments]
   Index *face, *pixel, *next;  // [max_fragments] next: next fragment in the pixel's list, or kNone

@@ -153,8 +153,8 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
              is_wanted = is_quad && is_not_black;
   const bool is_visible = is_wanted && clip_class == ClipClass::inside && passes_culling,
              is_clipped = is_wanted && clip_class == ClipClass::crossing;
-  // Two lanes allocate for the whole warp, faces and clipped entries at once; the results are needed only after the
-  // edges.
+  // Two lanes allocate for the whole warp: one allocates faces, the other clipped entries. The results are needed only
+  // after the edges.
   const unsigned visible = __ballot_sync(kAllLanes, is_visible), clipped = __ballot_sync(kAllLanes, is_clipped);
   const int lane = lane_index(), wanted = __popc(lane == 0 ? visible : (lane == 1 ? clipped : 0u));
   int32_t taken = 0;
@@ -348,7 +348,7 @@ class BestOccluders {
     ScreenQuad on_screen;
     bool is_clockwise = false;
   };
-  // Whether the lane's added face and the face that it holds are among the best.
+  // Whether the face that the lane adds, and the face that it already holds, are among the best.
   struct Chosen {
     bool own = false, kept = false;
   };

@@ -102,7 +102,7 @@ PICTURA_HD constexpr Fault fault_of(FaultWord word) {
   return {static_cast<FaultKind>(word >> 32), static_cast<int32_t>(static_cast<uint32_t>(word))};
 }
 
-/// Face count of an image that is not in the pool; so low that increments by other warps leave it negative.
+/// Face count of an image that is not in the pool. It is so low that increments by other warps leave it negative.
 constexpr int32_t kNotPrepared = -(1 << 30);
 
 /// An image that is ready to be drawn: its faces in the pool, and the data that determine whether solids stand on

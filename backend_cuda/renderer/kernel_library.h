@@ -14,7 +14,7 @@ namespace pictura::cuda {
 class KernelLibrary {
  public:
   /// Builds the kernels for a configuration's rig and CUDA device, which must be the current device. Without NVRTC,
-  /// uses the kernels compiled into this program. Throws Error if these do not run on the device.
+  /// uses the kernels that are compiled into this program, and throws Error if they do not run on the device.
   explicit KernelLibrary(const RendererConfig& config);
 
   const KernelSet& kernels() const { return kernels_; }

@@ -113,7 +113,7 @@ struct NoVisit {
   __device__ void operator()(const ScreenFace&, float) const {}
 };
 
-// Computes the fragments' weights. A fragment that is alone in its pixel gives the pixel's colour at once. For other
+// Computes the fragments' weights. A fragment that is alone in its pixel directly gives the pixel's colour. For other
 // fragments, the contribution and the kind of weight overwrite the samples and the pixel index.
 template <typename Memory, typename Visit, typename Write>
 __device__ void compute_weights(const Memory& memory, int count, const Visit& visit, const Write& write) {

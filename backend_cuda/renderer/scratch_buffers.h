@@ -31,8 +31,8 @@ constexpr PoolSizes pool_sizes(std::size_t images) {
   const std::size_t num_allocations = images + kMinPoolImages;
   return {images, num_allocations * kPoolFaces, num_allocations * kPoolEdges};
 }
-/// Bytes of a pool per image, and bytes of a pool without images. Their sum over all images is sufficient; it is too
-/// large by at most the bytes of one FaceBatch.
+/// Bytes of a pool per image, and bytes of a pool without images. For a pool of n images, n * kPoolImageBytes +
+/// kMinPoolBytes bytes are enough. The pool's real size is smaller by at most one FaceBatch.
 constexpr std::size_t kPoolImageBytes =
     (pool_sizes(FaceBatch::kEntries).bytes() - pool_sizes(0).bytes()) / FaceBatch::kEntries;
 constexpr std::size_t kMinPoolBytes = pool_sizes(0).bytes() + sizeof(FaceBatch);

@@ -15,8 +15,8 @@ struct WorldScratch {
   AgentBox* try_boxes = nullptr;   // [boxes, kSpawnTries] boxes of the free tries
   uint32_t* free_tries = nullptr;  // [boxes] bits of the known tries that are clear of all placed boxes
   int32_t* known_tries = nullptr;  // [boxes] number of evaluated tries
-  int32_t* chosen_try = nullptr;   // [boxes] -1: none
-  int32_t* next_try = nullptr;     // [boxes]
+  int32_t* chosen_try = nullptr;   // [boxes] chosen try; -1: none
+  int32_t* next_try = nullptr;     // [boxes] choice in the current round; -1: none
   BoxChains standing;              // boxes that have a place
   // Writable box_cells of a crowd; null: the world has one cell.
   int32_t *cell_begin = nullptr, *cell_items = nullptr;
