@@ -16,6 +16,10 @@ namespace pictura {
 /// Prints one object and a newline to stdout.
 void print_json(const Json& object);
 
+/// Prints a warning "what: text" for each text. If there are more than ten texts, prints ten of them and the number of
+/// the others.
+void print_warnings(const std::string& what, const std::vector<std::string>& texts);
+
 /// Returns the text of a duration, such as "1 h 02 min", "3 min 05 s" or "12 s".
 std::string format_duration(double seconds);
 

@@ -16,19 +16,6 @@ namespace pictura {
 
 namespace {
 
-const RecordedState& state_of(const CompiledMap& map, size_t track, int32_t step) {
-  const MapRecord& record = map.rules.record;
-  return record.states[track * static_cast<size_t>(record.num_steps) + static_cast<size_t>(step)];
-}
-
-/// First episode step at which the track is present; -1: none.
-int32_t first_step(const CompiledMap& map, size_t track) {
-  for (int32_t step = 0; step < map.rules.record.num_steps; ++step) {
-    if (state_of(map, track, step).is_present) return step;
-  }
-  return -1;
-}
-
 /// Returns whether an agent cannot start driving from its box: the box touches an edge, is off the road, or overlaps
 /// the box of an agent that is not removed.
 bool overlaps(const MapView& map, Span<const AgentBox> boxes, const std::vector<SceneRole>& roles, size_t track) {

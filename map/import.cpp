@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <utility>
 
 #include "pictura/common/error.h"
 #include "pictura/common/hypot.h"
@@ -23,9 +24,27 @@ void check(const OpenDriveOptions& options) {
                 plan.xx, plan.xy, plan.yx, plan.yy);
 }
 
-/// CARLA's towns need 0.2 samples per byte. Procedural towns need 0.7, and the largest has 35 MB. A straight road of
-/// 100 km needs half a million samples.
-SampleBudget import_budget(std::size_t text_bytes, const std::string& source, const InterruptibleWork& work) {
+}  // namespace
+
+MapImport::MapImport(std::size_t text_bytes, const std::string& source, const OpenDriveOptions& import_options,
+                     const ImportProgress& progress)
+    : options(import_options),
+      faults(import_options.strict),
+      text_bytes_(text_bytes),
+      source_(source),
+      progress_(progress),
+      work_(fmt::format("{}: interrupted while it was imported", source)) {
+  map.name = std::filesystem::path(source).stem().string();
+}
+
+void MapImport::begin(const char* stage, double done) const {
+  work_.check();
+  if (progress_) progress_(stage, done);
+}
+
+// CARLA's towns need 0.2 samples per byte. Procedural towns need 0.7, and the largest has 35 MB. A straight road of 100
+// km needs half a million samples.
+SampleBudget MapImport::budget() const {
   constexpr std::int64_t kBaseSamples = 500'000, kSamplesPerByte = 10, kMaxSamples = 60'000'000;
   return {std::min(kMaxSamples, kBaseSamples + kSamplesPerByte * static_cast<std::int64_t>(text_bytes_)), source_,
           work_};

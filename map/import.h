@@ -1,5 +1,5 @@
-// Functions that all importers of map files share: a check of options, a limit on samples, and errors that name the
-// file.
+// Frame of all importers of map files: a check of options, progress, a limit on samples, repairs, and errors that name
+// the file.
 #pragma once
 
 #include <cstddef>
@@ -13,29 +13,32 @@
 
 namespace pictura {
 
-/// Throws Error if options.chord_error_m is outside [0.001, 10] m, or if options.plan mirrors or has a singular value
-/// outside [0.5, 1.5].
-void check_import_options(const OpenDriveOptions& options);
+/// State of one import: the map, and what the importer needs to fill it.
+class MapImport {
+ public:
+  MapImport(std::size_t text_bytes, const std::string& source, const OpenDriveOptions& import_options,
+            const ImportProgress& progress);
 
-/// Returns the limit on samples of curves for a file of `text_bytes` bytes. It bounds the import time of small files
-/// and the memory for large files. `source` is the file's name in messages.
-SampleBudget import_budget(std::size_t text_bytes, const std::string& source, const InterruptibleWork& work);
+  /// Reports the stage that begins, and the completed share of the work. Throws Interrupted after a signal.
+  void begin(const char* stage, double done) const;
+  /// Returns the limit on samples of curves. It bounds the import time of small files and the memory for large files.
+  SampleBudget budget() const;
 
-/// Returns the RoadMap that import() returns. Adds the file's name, `source`, to the messages of errors that do not
-/// begin with it.
-template <typename Import>
-RoadMap import_named(const std::string& source, Import&& import) {
-  try {
-    return std::forward<Import>(import)();
-  } catch (const Interrupted&) {
-    throw;
-  } catch (const UsageError&) {
-    throw;
-  } catch (const Error& error) {
-    const std::string message = error.what();
-    if (message.starts_with(source)) throw;
-    fail("{}: {}", source, message);
-  }
-}
+  const OpenDriveOptions& options;
+  opendrive::Faults faults;
+  RoadMap map;
+
+ private:
+  std::size_t text_bytes_;
+  const std::string& source_;
+  const ImportProgress& progress_;
+  InterruptibleWork work_;
+};
+
+/// Calls fill(import), and returns the validated map with its repairs. Adds the file's name, `source`, to the messages
+/// of errors that do not begin with it. Throws Error if options.chord_error_m is outside [0.001, 10] m, or if
+/// options.plan mirrors or has a singular value outside [0.5, 1.5].
+RoadMap import_map(std::size_t text_bytes, const std::string& source, const OpenDriveOptions& options,
+                   const ImportProgress& progress, const std::function<void(MapImport* import)>& fill);
 
 }  // namespace pictura

@@ -12,17 +12,9 @@ namespace pictura {
 
 namespace {
 
-/// Imports the network. Errors about the network as a whole do not name the file, so the caller adds the file's name.
-RoadMap import_network(std::string_view text, const std::string& source, const OpenDriveOptions& options,
-                       const ImportProgress& progress) {
-  const InterruptibleWork work(fmt::format("{}: interrupted while it was imported", source));
+void import_network(std::string_view text, const std::string& source, MapImport* import) {
   // The shares of the work were measured on large networks.
-  const auto begin = [&](const char* stage, double done) {
-    work.check();
-    if (progress) progress(stage, done);
-  };
-  begin("reading", 0);
-  opendrive::Faults faults(options.strict);
+  import->begin("reading", 0);
   opendrive::Network network;
   opendrive::read_network(text, source, &import->faults, &network);
   opendrive::split_at_speed_changes(&network);
