@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "pictura/common/error_types.h"
 #include "pictura/common/grid_view.h"
 
 namespace pictura {

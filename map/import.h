@@ -6,6 +6,7 @@
 #include <functional>
 #include <string>
 
+#include "pictura/common/error_types.h"
 #include "pictura/common/support/interrupt.h"
 #include "pictura/map/opendrive/faults.h"
 #include "pictura/map/opendrive/opendrive.h"
