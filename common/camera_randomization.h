@@ -46,7 +46,7 @@ constexpr CameraRandomization kFullCameraSeverity{.rotation_deg = 6,
                                                   .dead_probability = 0.1,
                                                   .dropped_probability = 0.1};
 
-/// Maximum severity of an evaluation. It scales no range of kFullCameraSeverity above kMaxCameraRandomization.
+/// Maximum severity of an evaluation. At this severity, all ranges are within kMaxCameraRandomization.
 constexpr double kMaxCameraSeverity = 2;
 
 /// Scales all ranges by a factor. The random draws do not change: a camera turns in the same direction, by a scaled

@@ -13,8 +13,7 @@ struct Rgb {
   float r = 0, g = 0, b = 0;
 };
 
-/// Storage of a channel. u8: 0 to 255; f16 and f32: 0 to 1; bf16: 0 to 255, the value of u8, which a bfloat16 holds
-/// exactly.
+/// Storage of a channel. u8: 0 to 255; f16 and f32: 0 to 1; bf16: 0 to 255, which bfloat16 represents exactly.
 enum class PixelFormat : uint8_t { u8, f16, f32, bf16 };
 
 /// Layout of an image. planar: [3, height, width]. interleaved: [height, width, 3]. patches: [rows of patches, columns

@@ -15,8 +15,8 @@ struct HistoryViews {
     nowhere.world = -1;
     if (row < 0 || row >= num_steps * views_per_step) return nowhere;
     View view = views[row];
-    // Indices are checked before they are shifted to the history: afterwards, an index that is out of range in its own
-    // step could be valid in another step.
+    // Indices are checked before they are shifted, because a shifted index beyond its own step could refer to another
+    // step.
     if (view.world < 0 || view.world >= worlds_per_step || view.ego_agent >= agents_per_step) return nowhere;
     const auto step = static_cast<int32_t>(row / views_per_step);
     view.world += step * worlds_per_step;

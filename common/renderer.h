@@ -53,7 +53,7 @@ class Renderer {
   Renderer& operator=(const Renderer&) = delete;
 
   virtual std::string_view name() const = 0;
-  /// Device that scenes, views and queries are read from and images are written to.
+  /// Device of the scenes, views, queries and images.
   virtual Device device() const = 0;
   virtual const RendererConfig& config() const = 0;
   /// Whether the renderer draws all pixel formats, both as planar images and as patches. Other renderers draw only

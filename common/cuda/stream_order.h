@@ -1,5 +1,5 @@
-// Conversion between streams and the numbers by which DLPack (a standard for exchanging tensors) identifies them, and
-// dependencies between streams.
+// Conversion between streams and their numbers in DLPack (a standard for exchanging tensors), and dependencies between
+// streams.
 #pragma once
 
 #include <cstdint>

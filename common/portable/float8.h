@@ -100,7 +100,7 @@ inline void load_pairs(const float* from, Float8* first_out, Float8* second_out)
   first_out->value = _mm256_shuffle_ps(low, high, 0x88);
   second_out->value = _mm256_shuffle_ps(low, high, 0xDD);
 }
-/// Loads the pairs with the given indices, as load_pairs() does.
+/// Loads the pairs with the given indices, and separates them as load_pairs() does.
 inline void gather_pairs(const float* from, const int32_t* indices, Float8* first_out, Float8* second_out) {
   const auto two = [&](int k) {
     const auto pair = [&](int i) { return reinterpret_cast<const __m64*>(from + 2 * int64_t{indices[i]}); };
@@ -201,7 +201,7 @@ struct alignas(32) Float8 {
   }
   PICTURA_HD float operator[](int k) const { return value[k]; }
 };
-/// Returns the elements of(0) to of(7).
+/// Returns a vector of the elements `of(0)` to `of(7)`.
 template <typename Of>
 PICTURA_HD inline Float8 make_float8(Of&& of) {
   Float8 result;

@@ -23,7 +23,7 @@ struct Int16x8 {
 };
 constexpr int kInt16x8Size = 8, kInt16x8Half = 4;
 
-/// Returns a vector of the elements of(0) to of(7).
+/// Returns a vector of the elements `of(0)` to `of(7)`.
 template <typename Of>
 PICTURA_HD inline Int16x8 make_int16x8(Of&& of) {
   Int16x8 result;
@@ -37,8 +37,8 @@ PICTURA_HD inline Int16x8 make_int16x8(Of&& of) {
   return result;
 }
 
-/// Returns a vector whose element k is base + (k - 4) * step. This number must be in [0, 65,536); its 16 bits are
-/// stored.
+/// Returns a vector whose element k is base + (k - 4) * step. Each element must be in [0, 65,536) and is stored in 16
+/// bits.
 PICTURA_HD inline Int16x8 arithmetic_sequence(int32_t step, int32_t base) {
 #if defined(__CUDA_ARCH__)
   Int16x8 result;

@@ -26,8 +26,8 @@ const RendererConfig& check_config(std::string_view renderer, const RendererConf
 /// exist, and every agent's box must be finite.
 void check_scene(std::string_view renderer, const SceneBatch& scene, const HostGeometries& geometries);
 
-/// Throws Error unless each view's world, ego and range of hidden agents exist in a host scene that check_scene
-/// accepted. A view's pose must be finite, and its key's agent must be valid for random numbers.
+/// Throws Error unless each view's world, ego and range of hidden agents exist in the host scene, which check_scene()
+/// must have accepted. A view's pose must be finite, and its key's agent must be valid for random numbers.
 void check_views(std::string_view renderer, const SceneBatch& scene, Span<const View> views);
 
 /// Returns the first `count` views of a host batch. Throws Error unless the count is between 0 and the number of views.

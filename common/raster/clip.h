@@ -55,8 +55,8 @@ PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Corners& corne
   return outside_of_all != 0 ? kOutside : outside_of_any;
 }
 
-/// Intersection of the side from a to b with a plane, given inside() of a and of b. It is computed from the inner
-/// corner in both directions, so that two faces with a common side get the same point.
+/// Intersection of the side from a to b with a plane, given inside() of a and of b. It is computed from the inner of
+/// the two corners, so that two faces with a common side get the same point.
 PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_inside) {
   const bool a_is_inner = a_inside >= 0.0f;
   const Vec3 inner = a_is_inner ? a : b, outer = a_is_inner ? b : a;
@@ -67,9 +67,9 @@ PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_insid
 /// Maximum number of corners that widen_in_front() emits.
 constexpr int kMaxWidenedCorners = 5;
 /// Widens a strip in camera coordinates to at least floor_px on screen. If the strip crosses the near plane, it is cut
-/// there, and only its far end is widened: if its sides moved as a whole, they would be far from the strip near the
-/// camera. Calls emit(i, corner) for i = 0, 1, ... and returns the number of corners. For other faces, floor_px is 0
-/// and the corners do not change.
+/// there, and only its far end is widened: if its sides moved as a whole, they would leave the strip near the camera.
+/// Calls emit(i, corner) for i = 0, 1, ... and returns the number of corners. For other faces, floor_px is 0 and the
+/// corners do not change.
 template <typename Emit>
 PICTURA_HD inline int widen_in_front(const PinholeCamera& camera, float floor_px, const Vec3* corners, Emit&& emit) {
   Vec3 widened[4];

@@ -56,7 +56,8 @@ class PixelAccumulator {
 
   PICTURA_HD Shares shares() const {
     const float whole = area_of(kWhole), partial = area_of(kPartial);
-    // If the areas exceed a pixel, the weights that samples estimate least accurately are reduced first.
+    // If the areas sum to more than a pixel, the remainder is reduced first, then partial fragments, then whole
+    // fragments, whose areas are exact.
     const float for_partial = max_of(1.0f - whole, 0.0f);
     Shares shares;
     if (whole > 1.0f) shares.of_kind[kWhole] = 1.0f / whole;

@@ -130,7 +130,7 @@ PICTURA_HD inline float area_of(const PolygonEdge& edge, const EdgeCrossing& cro
 }
 
 /// Coverage of pixel (x, y) by a convex polygon; empty if the area is below min_area. Edges that do not cross the pixel
-/// keep all samples and add their part of the area, so that they need no special case.
+/// need no special case: they keep all samples or none, and add their part of the area.
 PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, float min_area, int x, int y) {
   const float x_px = no_rematerialize(static_cast<float>(x)), y_px = no_rematerialize(static_cast<float>(y));
   float area = 0.0f;

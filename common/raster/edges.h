@@ -21,8 +21,8 @@ struct alignas(16) PolygonEdge {
   int32_t rows_step = 0;
 };
 
-/// Calls visit(edge) for the edges of a polygon. Each edge is loaded while the previous edge is visited, into two
-/// variables alternately, which avoids moves.
+/// Calls visit(edge) for the edges of a polygon. Loads each edge while the previous edge is visited. Two variables
+/// alternate, so that no edge is copied.
 template <typename Visit>
 PICTURA_HD inline void for_each_edge(const PolygonEdge* edges, int count, Visit&& visit) {
   PolygonEdge even = edges[0], odd;
@@ -44,8 +44,8 @@ constexpr float kLevel_px = 1e-6f, kUpright_px = 1e-6f;
 constexpr int kSampleColumns = kInt16x8Size, kSampleRows = 8;
 /// Sample tests use heights as 16-bit integers, kRowUnits per row, relative to the pixel's centre. In the first column
 /// right of the centre, a line's height is clamped to +-kLines_rows / 2; per column, it changes by at most kSteepest
-/// rows. So the line has left the pixel before it is clamped, and 16 bits do not overflow. The slopes of steeper lines
-/// are reduced to kSteepest, so that they cross a column over some 8 rows. An upright line would otherwise include all
+/// rows. So a clamped line does not cross the pixel, and 16 bits do not overflow. The slopes of steeper lines are
+/// reduced to kSteepest, so that they cross a column over some 8 rows. An upright line would otherwise include all
 /// samples of a column or none, which would quantize areas to eighths of the pixel.
 constexpr int kRowUnits = 128;
 constexpr float kLines_rows = 256.0f, kSteepest = 9.0f;

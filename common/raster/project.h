@@ -155,8 +155,8 @@ struct ScreenQuad {
 /// or crossing (clipped first).
 enum class ClipClass : uint8_t { outside, inside, crossing };
 
-/// Projects a face of four corners, and widens strips to at least floor_px on screen. So most faces, which need no
-/// clipping, are never widened in camera coordinates.
+/// Projects a face of four corners, and widens strips to at least floor_px on screen. So strips that need no clipping
+/// are never widened in camera coordinates.
 PICTURA_HD inline ClipClass project_quad(const PinholeCamera& camera, const Vec3* corners, float floor_px,
                                          ScreenQuad* quad_out) {
   const float nearest_m = min_no_nan(min_no_nan(corners[0].z, corners[1].z), min_no_nan(corners[2].z, corners[3].z));

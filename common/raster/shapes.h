@@ -27,8 +27,8 @@ PICTURA_HD inline FacePlane quad_plane(const Vec3* corners) {
   return {normal, dot(normal, corners[0])};
 }
 
-/// Brightness of a face: 1 minus the mean over its corners of depth / kVisibleRange_m, each clamped to [0, 1]. A face
-/// with brightness 0 is not drawn and occludes nothing.
+/// Brightness of a face: 1 minus the mean of its corners' depths, in units of kVisibleRange_m, each clamped to [0, 1].
+/// A face with brightness 0 is not drawn and occludes nothing.
 PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
   float faded = 0.0f;
   PICTURA_UNROLL_FOUR
@@ -234,7 +234,7 @@ struct Widening {
 };
 
 /// Widening of a strip whose centre line runs from a to b, in camera coordinates; a and b may be scaled by a common
-/// factor. One end may be behind the camera: the line on screen is then the same, and its direction does not matter.
+/// factor. One end may be behind the camera, because only the line on screen matters, not its direction.
 PICTURA_HD inline Widening widening_of(const PinholeCamera& camera, float floor_px, Vec3 a, Vec3 b) {
   // Direction on screen, times the product of both depths.
   const Vec2 ahead{camera.focal_x_px * (b.x * a.z - a.x * b.z), camera.focal_y_px * (b.y * a.z - a.y * b.z)};
@@ -279,11 +279,11 @@ PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& came
   emit_quad(strip_quad(strip), camera, floor_px, emit);
 }
 
-/// Strips are on one level if their heights differ by less than this. The rank of such strips decides which of them is
-/// in front, instead of the depth.
+/// Strips are on one level if their heights differ by less than this. The rank, not the depth, decides which of such
+/// strips is in front.
 constexpr float kSameLevel_m = 0.05f;
-/// The depth of a strip is clamped to the range of its corners' depths, widened by this factor. When the camera is
-/// close to the strip's plane, the depth of the plane would vary without bound within a pixel.
+/// The depth of a strip is clamped to the range of its corners' depths, widened by this factor. Otherwise, if the
+/// camera is close to the strip's plane, the depth would vary without bound within a pixel.
 constexpr float kWidenedDepth = 2.0f;
 /// Relative difference below which depths count as equal, so that rounding does not decide between faces in one plane.
 constexpr float kEqualDepth = 1e-4f;

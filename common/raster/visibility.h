@@ -102,8 +102,8 @@ PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQua
     return interval;
   };
   const Interval of_a = project(a), of_b = project(b);
-  // Displacement along the axis until the quads only touch, times the side's length. The displacement is positive even
-  // if one interval is a point (that of a wall) within the other interval.
+  // Displacement along the axis after which the quads would only touch, times the side's length. The displacement is
+  // positive even if one interval is a point (that of a wall) within the other interval.
   const float overlap = min_no_nan(of_a.high - of_b.low, of_b.high - of_a.low);
   const float length2_m2 = dot(side, side);
   return length2_m2 > 1e-12f && (overlap <= 0.0f || overlap * overlap <= kTouching_m * kTouching_m * length2_m2);
@@ -140,10 +140,9 @@ PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
 /// nearer solids, because solids extend through the strip.
 PICTURA_HD inline bool is_strip_from_below(const ScreenFace& face) { return face.plane_distance_m > 0.0f; }
 
-/// Maximum, on a ray from the camera, of a solid's inverse depth divided by a strip's inverse depth, if the solid
-/// stands on the strip. The camera is plane_distance_m below the strip's plane, and solids extend up to kThroughStrip_m
-/// below the plane. The ratio is infinite if the camera is within that distance, and 1 if the camera is above the
-/// plane.
+/// Maximum ratio, on a ray from the camera, of a solid's inverse depth to that of the strip on which the solid stands.
+/// The camera is plane_distance_m below the strip's plane, and solids extend up to kThroughStrip_m below the plane. The
+/// ratio is infinite if the camera is within that distance, and 1 if the camera is above the plane.
 PICTURA_HD inline float nearest_standing(float plane_distance_m) {
   if (!(plane_distance_m > 0.0f)) return 1.0f;
   return plane_distance_m > kThroughStrip_m ? plane_distance_m * reciprocal_in_range(plane_distance_m - kThroughStrip_m)
@@ -248,10 +247,11 @@ PICTURA_HD inline float inverse_depth_half_range(const ScreenFace& face) {
 
 /// Number of bits of occluder_bound() that may be set: the highest bits of a float.
 constexpr int kOccluderBoundBits = 21;
-/// Lower bound of a face's inverse depth within a pixel that the face covers fully. The face hides all faces with a
-/// smaller inverse depth everywhere in the pixel. The bound of a strip is 0, because other strips may be painted over
-/// the strip, and a solid behind the strip may stand on it. The bound is never negative or NaN, because kernels sort by
-/// its bits. It is reduced by more than kEqualDepth, so that a face hides neither itself nor an equally near face.
+/// Lower bound of a face's inverse depth within a pixel that the face covers fully. The face hides all faces whose
+/// inverse depth is below the bound in the whole pixel. The bound of a strip is 0, because other strips may be painted
+/// over the strip, and a solid behind the strip may stand on it. The bound is never negative or NaN, because kernels
+/// sort by its bits. It is reduced by more than kEqualDepth, so that a face hides neither itself nor an equally near
+/// face.
 PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   if (is_strip(face)) return 0.0f;
   const float lowest =
