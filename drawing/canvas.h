@@ -65,7 +65,7 @@ class Canvas {
     void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
   };
   Canvas(std::unique_ptr<std::string> svg, const std::string& name, int width_px, int height_px, Rgb background);
-  // `svg` is a reference: the call's argument for `surface` also reads the pointer, and arguments are evaluated in
+  // `svg` is a reference, because the caller computes `surface` from the same pointer, and arguments are evaluated in
   // unspecified order.
   Canvas(cairo_surface_t* surface, std::unique_ptr<std::string>&& svg, const std::string& name, int width_px,
          int height_px, Rgb background);
