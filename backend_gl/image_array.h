@@ -1,5 +1,5 @@
-// Images of one size as the layers of one array texture. Contains the memory for a batch of images, with all samples of
-// each pixel, and the pass that averages the samples into planar images in a buffer.
+// Images of one size as the layers of one array texture, which holds all samples of each pixel. A pass averages the
+// samples into planar images in a buffer.
 #pragma once
 
 #include <initializer_list>
