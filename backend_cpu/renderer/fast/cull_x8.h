@@ -94,7 +94,7 @@ class BallGrid {
   std::vector<uint8_t> starts_;  // bits: whether the item's box begins in this cell's column, and in its row
 };
 
-/// Bounding balls, sorted by the cells of their centres. It finds the balls that are in a frustum.
+/// Bounding balls, sorted by the cells of their centres. Finds the balls that are in a frustum.
 class CenteredBalls {
  public:
   explicit CenteredBalls(const std::vector<BallGrid::Ball>& balls)
