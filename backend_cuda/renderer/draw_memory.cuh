@@ -29,7 +29,7 @@ struct DrawMemory {
   using Word = Word_;
   static constexpr int kThreads = kThreads_;
   static constexpr int kHalf = 4 * sizeof(Word);
-  /// Value of a word's lower half without a face or pixel.
+  /// Value of a word's lower half that holds no face or pixel.
   static constexpr Word kNone = (Word{1} << kHalf) - 1;
   /// Flag in a candidate's lower half: the face covers the pixel fully.
   static constexpr Word kCoversFully = Word{1} << (kHalf - 1);
@@ -120,7 +120,7 @@ __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragm
   memory->rows = reinterpret_cast<Word*>(bytes + rows_begin);
   memory->max_rows = static_cast<int32_t>((candidates_begin - rows_begin) / sizeof(Word));
   memory->candidates = reinterpret_cast<Word*>(bytes + candidates_begin);
-  // Most candidates become fragments, so a larger list would exceed max_fragments anyway.
+  // Most candidates become fragments, so with a longer list, the fragments would exceed max_fragments anyway.
   memory->max_candidates = max_fragments + max_fragments / 2;
   return layout.used;
 }

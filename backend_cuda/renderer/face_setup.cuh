@@ -10,8 +10,8 @@
 
 namespace pictura::cuda {
 
-/// Values that a lane loads or stores, as words of 16 bytes. One word of padding avoids bank conflicts. Writes of one
-/// word per lane to its own row have no conflicts; joint reads of rows by several lanes have at most two-way conflicts.
+/// Values that a lane loads or stores, as words of 16 bytes. One word of padding limits bank conflicts: there are none
+/// if each lane writes one word to its own row, and at most two-way conflicts if several lanes read a row together.
 template <typename Value, int kValues = 1>
 struct LaneRow {
   static constexpr int kWords = kValues * sizeof(Value) / sizeof(uint4), kRowsAtOnce = kWarpSize / kWords;
@@ -314,8 +314,8 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
   return true;
 }
 
-// Selects the added solid faces with the largest area as occluders. Lane i holds the entry and area of occluder i;
-// the occluder itself is in the context's setting.
+// Selects as occluders the faces of largest area among those passed to add(). Lane i holds the entry and area of
+// occluder i; the occluder itself is in the context's setting.
 class BestOccluders {
  public:
   __device__ explicit BestOccluders(FaceSetupContext* context) : context_(context) {}

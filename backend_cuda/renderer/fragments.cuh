@@ -17,8 +17,8 @@ __device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px
 
 /// Word of a pixel. While full faces are searched, the upper bits hold the largest occluder bound, as bits that sort
 /// like the bound. The lower bits hold the index of the bound's face plus 1. From the pixel's first fragment on, the
-/// upper bits hold the first fragment of its list, and the sign bit is set. The word is 0 without a face and a
-/// fragment.
+/// upper bits hold the first fragment of its list, and the sign bit is set. The word is 0 if the pixel has neither a
+/// face nor a fragment.
 template <typename Word>
 struct PixelWord {
   static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;

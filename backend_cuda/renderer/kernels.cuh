@@ -118,7 +118,7 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kClipBlocksPerProces
   ClipShared* storage = &geometry_shared()->clip;
   DrawCounters* counters = task.counters;
   const SetupCounts listed = counters->listed;
-  // A warp takes only a few faces if the work is then spread over all warps, because each face is a long chain of
+  // Faces are spread over all warps, even if a warp then takes few faces, because each face is a long chain of
   // dependent instructions.
   const auto num_blocks = static_cast<int32_t>(gridDim.x);
   const int batch = clamp((listed.clipped + num_blocks - 1) / num_blocks, 1, kWarpSize);

@@ -210,7 +210,7 @@ struct DeviceResults {
     PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   }
-  /// Sets all rows to zero, because later writes zero a set's rows only up to the set's last count.
+  /// Sets all rows to zero, because a later write to a set clears only the rows that the previous write filled.
   void clear(cudaStream_t stream) const {
     const auto clear_one = [stream](const auto& buffer) {
       if (buffer.size() == 0) return;

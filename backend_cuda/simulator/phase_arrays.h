@@ -28,7 +28,7 @@ constexpr int32_t kNoSlot = 0x7F7F7F7F;
 /// Addresses of all memory that the phases read and write, in one memory space.
 struct PhaseArrays {
   WorldView* worlds = nullptr;             // [num_worlds] box_cells: see one_cell() and is_crowd()
-  WorldView* next_worlds = nullptr;        // [num_worlds] the same worlds, over memory for their next episode
+  WorldView* next_worlds = nullptr;        // [num_worlds] the same worlds, with the memory of their next episode
   const WorldScratch* scratch = nullptr;   // [num_worlds]
   const int32_t* world_of_slot = nullptr;  // [num_slots]
   int32_t num_worlds = 0, num_slots = 0;

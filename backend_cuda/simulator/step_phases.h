@@ -6,8 +6,8 @@
 
 namespace pictura::cuda {
 
-/// Phase that finds the lowest slot with a command out of range. CommandType is an action's int32_t or Command, here
-/// and below.
+/// Phase that finds the lowest slot with a command out of range. Here and below, CommandType is either int32_t (an
+/// action) or Command.
 template <typename CommandType>
 struct CheckCommands {
   PhaseArrays arrays;
@@ -159,7 +159,8 @@ struct FinishStep {
     return ends;
   }
 
-  /// Adds counts in any order, and sums in the order of the totals' bins, see simulator/totals.h.
+  /// Adds up integers in any order, and floating-point numbers in the order of the totals' bins, see
+  /// simulator/totals.h.
   template <typename ThreadGroup, int kParts>
   PICTURA_HD static void add_up(const ThreadGroup& group, SimulatorTotals (&parts)[kParts], SimulatorTotals* sum_out) {
     const auto skip = [](auto&, auto) {};
