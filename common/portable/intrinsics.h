@@ -5,8 +5,8 @@
 
 namespace pictura {
 
-/// 1 / x and the square root of x, correctly rounded (IEEE 754), for |x| in [2^-100, 2^100]. The device code is the
-/// code that the CUDA compiler generates for that range, without its test of the range.
+/// 1 / x and the square root of x, correctly rounded (IEEE 754), for |x| in [2^-100, 2^100]. The device code is what
+/// the CUDA compiler generates for that range, without the test of the range.
 PICTURA_HD inline float reciprocal_in_range(float x) {
 #if defined(__CUDA_ARCH__)
   float guess;

@@ -224,8 +224,8 @@ PICTURA_HD inline void strip_corners(const Strip& strip, Vec3* corners_out) {
 struct Widening {
   Vec2 across;  // unit vector from the strip's right side to its left; 0 if the strip is a point on screen
   float floor_px = 0;
-  /// Displacement on screen of the left corner of one end of the strip, given the offset of the left corner from the
-  /// right corner. The right corner moves by the opposite displacement.
+  /// Displacement on screen of the left corner of one end of the strip, given the offset from the end's right corner to
+  /// its left corner. The right corner moves by the opposite displacement.
   PICTURA_HD Vec2 push_px(Vec2 gap_px) const {
     const float width_px = dot(gap_px, across);
     const float missing_px = 0.5f * max_no_nan(floor_px - fabsf(width_px), 0.0f);
