@@ -87,7 +87,7 @@ inline Mask8 occludes(const Occluders& occluders, const PinholeCamera& camera, c
 
 /// Sets up eight strips.
 inline StripsX8 set_up_strips(const ImageSetting& setting, const Strip* const* strip) {
-  // The members of the strips, by fours.
+  // Loads the members of the strips, four at a time.
   static_assert(offsetof(Strip, color) == 11 * sizeof(float));
   Float8 member[16];
   for (int first : {0, 4, 8, 12}) {
