@@ -14,7 +14,7 @@ namespace pictura {
 /// vehicle is hidden if walls block every tested line of sight from the driver's eye to the vehicle's box.
 struct BlindApproaches {
   int32_t approaches = 0;  // lanes that lead into a path that another path crosses
-  int32_t blind = 0;       // approaches on which any crossing vehicle is hidden
+  int32_t blind = 0;       // approaches on which at least one crossing vehicle is hidden
   int32_t crossings = 0;   // ordered pairs (driver, vehicle) of crossing paths
   int32_t hidden = 0;      // crossings whose vehicle is hidden
 };

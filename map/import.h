@@ -1,5 +1,5 @@
-// Frame of all importers of map files: a check of options, progress, a limit on samples, repairs, and errors that name
-// the file.
+// Steps that all importers of map files share: a check of options, progress, a limit on samples, repairs, and errors
+// that name the file.
 #pragma once
 
 #include <cstddef>

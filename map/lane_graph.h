@@ -31,8 +31,8 @@ struct LaneComponents {
 };
 
 /// Lane graph, with its own copy of the map data that it needs. A lane change keeps the position as a fraction of the
-/// lane's length, and has a fixed cost in metres. A route changes lanes only at its start and at starts of lanes. Later
-/// changes would reach no other lanes, because neighbours begin and end together.
+/// lane's length, and has a fixed cost in metres. A route changes lanes only at its start and at starts of lanes.
+/// Changes farther along a lane would reach no other lanes, because neighbours begin and end together.
 class LaneGraph {
  public:
   /// Throws Error if the cost is negative or not finite. The map must be validated.

@@ -26,18 +26,18 @@ class Surface {
  public:
   Surface(const std::vector<SurfaceBand>& bands, double level_m);
 
-  /// Quads near the position of find_near(). They include all quads that cover any point within kNear_m of this
-  /// position.
+  /// Quads near the position that was passed to find_near(). They include all quads that cover any point within kNear_m
+  /// of this position.
   struct Candidates {
     std::vector<int32_t> quads;
-    bool are_complete = false;  // false if the circle around the position is in several cells
+    bool are_complete = false;  // false if the circle of radius kNear_m is in several cells
   };
 
   /// Finds the candidates near `p`, so that several queries near `p` share one lookup.
   void find_near(const Eigen::Vector2d& p, double z, Candidates* out) const;
 
-  /// Whether `p` is covered by any band that is_wanted(band) accepts. `p` must be within kNear_m of the position of
-  /// find_near().
+  /// Whether `p` is covered by any band that is_wanted(band) accepts. `p` must be within kNear_m of the position that
+  /// was passed to find_near().
   template <typename IsWanted>
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted) const {
     return any_near(near, p, z, is_wanted, [](int32_t) { return true; });
@@ -55,8 +55,8 @@ class Surface {
   }
   static constexpr double kNear_m = 0.1;
 
-  /// Whether the band folds over itself at `p`, as in a turn that is tighter than the band's width. It does if a quad
-  /// of the band covers `p` and is more than `reach_m` along the band from its quad `from`.
+  /// Whether the band folds over itself at `p`, as in a turn that is tighter than the band's width. It does if one of
+  /// its quads covers `p` and is more than `reach_m` away from quad `from`, measured along the band.
   bool is_folded_over(const Candidates& near, const Eigen::Vector2d& p, double z, int32_t band, std::size_t from,
                       double reach_m) const;
 

@@ -81,8 +81,8 @@ Eigen::Vector3d point_at_fraction(const Points& line, double fraction);
 std::vector<CurvePoint> cut_line(const std::vector<CurvePoint>& line, SampleBudget* budget);
 std::vector<CurvePoint> cut_line(const Points& line, SampleBudget* budget);
 
-/// Whether vehicles may drive on a lanelet or area with these tags. The tags participant:* decide if there are any,
-/// else the subtype.
+/// Whether vehicles may drive on a lanelet or area with these tags. Tags participant:* take precedence over the
+/// subtype.
 bool is_for_vehicles(const Tags& tags);
 
 /// Selects lanelets with two borders, aligns the borders, and sets the map's origin to the centre of their points, in

@@ -1,5 +1,5 @@
-// Positions relative to a reference line, which consists of OpenDRIVE's lines, arcs, spirals and plane cubics.
-// Evaluates also the cubics of elevation, banking, offsets and widths. Numbers are doubles in file coordinates.
+// Positions relative to a reference line, which consists of OpenDRIVE's lines, arcs, spirals and plane cubics. Also
+// evaluates the cubics of elevation, banking, offsets and widths. Numbers are doubles in file coordinates.
 #pragma once
 
 #include <cmath>
@@ -23,14 +23,14 @@ void measure(PlaneCubic* cubic);
 void measure(GeometryPiece* piece);
 
 /// Returns the pose at distance `ds` from the start of a piece. It is exact for lines and arcs. Spirals use
-/// Gauss-Legendre quadrature; measure() must be called for them before. Plane cubics are parametrised by arc length,
+/// Gauss-Legendre quadrature, and require an earlier call of measure(). Plane cubics are parametrised by arc length,
 /// which is scaled so that the cubic ends at the end of the piece.
 Pose pose_on(const GeometryPiece& piece, double ds);
 
 /// Returns the pose of the reference line at s, which is clamped to the road.
 Pose pose_at(const FileRoad& road, double s);
 
-/// Returns the position on a deformed road of a point at s. On other roads, returns the point unchanged.
+/// Applies the deformation of a road to a point at station s. Returns the point unchanged if the road is not deformed.
 Eigen::Vector2d deformed_point(const FileRoad& road, double s, const Eigen::Vector2d& point_m);
 
 /// Returns the length of the reference line between the stations `begin` and `end`. It differs from `end` - `begin`
@@ -105,8 +105,8 @@ double lane_width(const FileRoad& road, const FileSection& section, const FileLa
 constexpr int inner_border(int lane_id) { return lane_id > 0 ? lane_id - 1 : lane_id + 1; }
 
 /// Returns every s in [begin, end] at which a formula changes, sorted, including begin and end. Formulas change where
-/// pieces of geometry begin, and where cubics of elevation, banking or lane offset begin. They also change where cubics
-/// of widths and heights begin, of the lanes up to `border`.
+/// pieces of geometry begin, and where cubics of elevation, banking or lane offset begin. For the lanes up to `border`,
+/// they also change where cubics of widths and heights begin.
 std::vector<double> formula_changes(const FileRoad& road, const FileSection& section, int border, double begin,
                                     double end);
 

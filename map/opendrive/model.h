@@ -202,7 +202,7 @@ struct CrossSection {
 };
 
 /// Deformation of a road's points in an affine copy of its map; see deform.h. The shift of the reference line changes
-/// from start to end as a smoothstep of s. So the shift does not change the headings at both ends.
+/// from start to end as a smoothstep of s. So the shift changes the heading at neither end.
 struct RoadDeformation {
   PlanMap plan;
   std::array<double, 2> start_shift_m{}, end_shift_m{};

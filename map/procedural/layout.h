@@ -31,8 +31,8 @@ struct Arm {
   double mouth_m = 0;                               // distance from the node to the end of the street
 };
 
-/// Kind of a node. At a fork, a ramp leaves the outermost lane of a motorway in one direction, and another ramp becomes
-/// its outermost lane in the other direction.
+/// Kind of a node. At a fork, the outermost lane of a motorway becomes a ramp in one direction of travel, and another
+/// ramp becomes the outermost lane in the other direction.
 enum class NodeKind { crossing, roundabout, overpass, fork };
 
 /// Kind of a street. Connectors lead from the town to its motorway. Ramps are one-way, from Street::from to Street::to.
@@ -70,7 +70,7 @@ struct Street {
   double length_m = 0;
 };
 
-/// Distance of the left border of lane `lane`, counted from 0, from the street's reference line.
+/// Distance from the street's reference line to the left border of lane `lane`, counted from 0.
 inline double lane_offset_m(const Street& street, int lane) {
   return (street.kind == StreetKind::motorway ? kHalfMedian_m : 0) + lane * street.lane_width_m;
 }

@@ -21,7 +21,7 @@ struct GroundBox {
 
 /// Edges of a map for road_side(), and the grid cells that they touch.
 struct SideEdges {
-  std::vector<SideEdge> edges;  // parallel to RoadMap::road_edges
+  std::vector<SideEdge> edges;  // in the order of RoadMap::road_edges
   Grid cells;
 };
 SideEdges side_edges_of(const RoadMap& map);

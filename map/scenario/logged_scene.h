@@ -129,7 +129,8 @@ struct LoggedScene {
   bool has_links = true;  // if false, lanes are linked where their ends meet
   /// Whether a program wrote the scene, so that it does not come from a recording. Then nothing is inferred. Types of
   /// lanes, directions of links, sides and gaps of edges, and the grouping of lights are used as they are. Points are
-  /// rounded first. So the scenario does not change if scene_of_scenario() and make_scenario() are applied to it.
+  /// rounded to the precision of a map. So the scenario does not change if scene_of_scenario() and make_scenario() are
+  /// applied to it.
   bool is_authored = false;
   double tolerance_m = 0.02;                // maximum deviation of thinned polylines; 0: all points are kept
   std::optional<Eigen::Vector3d> origin_m;  // origin of the map; by default the centre of lanes and edges
@@ -148,7 +149,7 @@ struct LoggedScene {
 };
 
 /// Converts a scene to a scenario. Throws Error "SOURCE: FIELD: expected ..., got ..." if a valid state or a point of
-/// the map is not finite or is more than 10 km from the scene's centre. Also throws Error if there is no lane of two
+/// the map is not finite or is more than 10 km from the scene's centre. Also throws Error if no lane has at least two
 /// points, if there is no track, or if the map would need more points than the limit for scenes.
 Scenario make_scenario(LoggedScene scene);
 
