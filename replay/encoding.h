@@ -1,4 +1,5 @@
-// Encodings that replay files use: differences of whole numbers with variable length, zlib streams, and base64 text.
+// Encodings that replay files use: whole numbers of variable length and their differences, zlib streams, and base64
+// text.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Small HTTP server for pages in browsers, mainly of this machine. Each connection carries one request. Ranges,
+// Small HTTP server for pages in browsers, mainly on this machine. Each connection carries one request. Ranges,
 // encodings and transfer codings are not supported. The cost of a connection is limited: the size of the request, the
 // times to read it and to write an answer, and the number of threads.
 #pragma once

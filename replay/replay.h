@@ -25,8 +25,8 @@ constexpr int64_t kMaxReplayNumbers = int64_t{1} << 26;
 constexpr int kReplayVersion = 2;
 
 // List of the tracks, which are quantities of every agent at every frame: X(name, unit, order). A track stores whole
-// numbers of its unit, as differences of its order between frames. Values of a step belong to the frame after the step.
-// They are 0 at the first frame of an episode.
+// numbers of `unit`, as differences of order `order` between frames. Values of a step belong to the frame after the
+// step. They are 0 at the first frame of an episode.
 #define PICTURA_REPLAY_STATE_TRACKS(X) \
   X(x_m, 0.01, 2)                      \
   X(y_m, 0.01, 2)                      \
@@ -154,8 +154,9 @@ struct ReplayScenery {
   bool operator==(const ReplayScenery&) const = default;
 };
 
-/// Number of values of a decision: the response of the followed agent's policy to a frame. They are the probability of
-/// each action, then the value, in units of kDecisionUnit. All are 0 if the policy was not evaluated.
+/// Number of values of a decision, which is the response of the followed agent's policy to a frame. The values are the
+/// probability of each action, then the policy's value, in units of kDecisionUnit. All are 0 if the policy was not
+/// evaluated.
 constexpr size_t kDecisionValues = kNumActions + 1;
 constexpr double kDecisionUnit = 1e-4;
 
