@@ -34,8 +34,8 @@ struct RecordedDriver {
 
 /// Returns the renderer configuration of the policy's images, or of the paper's cameras for a controller.
 RendererConfig cameras_of(const RecordedDriver& driver);
-/// Returns the policy's response to an agent's current observation in the only world. Returns nothing if the driver is
-/// not a policy or the agent is not active.
+/// Returns the policy's response to the current observation of an agent in the simulator's only world. Returns nothing
+/// if the driver is not a policy or the agent is not active.
 std::optional<ReplayDecision> decision_of_agent(Simulator& simulator, const RecordedDriver& driver, int agent);
 /// Returns the origin of a replay: this process's command and version, and the driver.
 ReplayOrigin origin_of(const RecordedDriver& driver);

@@ -47,8 +47,8 @@ Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& s
 Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& scenario,
                        const RecordedTakeover& takeover, const RecordingOptions& recording);
 
-/// Writes replays of the `count` worst scenarios into a folder with a gallery, with record_scenario(). Reports the
-/// files on stderr, and counts that differ from those of the evaluation.
+/// Writes replays of the `count` worst scenarios into a folder with a gallery, with record_scenario(). Reports on
+/// stderr the files, and any counts that differ from the evaluation's.
 void write_scenario_replays(const EvaluateOptions& options, const EvaluationResults& results,
                             const RecordingOptions& recording, int count, const std::string& folder);
 /// Writes a replay of the worst scenario into one file, and reports as write_scenario_replays() does.
