@@ -23,8 +23,8 @@ CLI::Option* add_sampled_option(CLI::App* command, bool* argmax_out);
 /// Adds --average, which selects the average of weights that a checkpoint holds.
 CLI::Option* add_average_option(CLI::App* command, bool* average_out);
 
-/// Reports the progress of an evaluation. For a long evaluation, also prints once the expected time and how to shorten
-/// it.
+/// Reports the progress of an evaluation. For a long evaluation, also prints one notice of the expected time and of
+/// ways to shorten the evaluation.
 class EvaluationProgress {
  public:
   /// `finished` names the results that are reported after an interrupt, such as "the completed scenarios".
