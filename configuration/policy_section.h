@@ -15,10 +15,10 @@ constexpr int kMaxDecisionSteps = 1000;
 
 struct PolicySection {
   Modality modality = Modality::perspective;
-  // Only for the vector modality: observes also values that no camera could observe (the policy Vectorized of the
+  // Only for the vector modality: also observes values that no camera could observe (the policy Vectorized of the
   // paper).
   bool auxiliary = false;
-  // Space to depth: each patch of patch_px x patch_px pixels becomes one pixel with the channels of all of them.
+  // Space to depth: each patch of patch_px x patch_px pixels becomes one pixel with the channels of all its pixels.
   int patch_px = 4;
   std::vector<int> conv_channels{64, 64, 128, 128, 128};
   std::vector<int> conv_kernels{1, 3, 3, 3, 3};

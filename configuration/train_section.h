@@ -29,7 +29,7 @@ struct TrainSection {
   // Learning rate, see training/schedule.h.
   Schedule schedule = Schedule::cosine;
   int64_t schedule_agent_steps = 50'000'000'000;
-  int64_t decay_agent_steps = 0;  // the rate falls in the last decay_agent_steps of the schedule; 0: in all
+  int64_t decay_agent_steps = 0;  // the rate falls in the last decay_agent_steps of the schedule; 0: throughout
   int64_t warm_up_agent_steps = 0;
   int num_steps = 128;            // steps per rollout
   bool stagger_episodes = false;  // ends the first episodes of worlds at different times, see max_steps_of()
@@ -48,8 +48,8 @@ struct TrainSection {
   // Agent-steps in which the policy's logits double (training/schedule.h); 0: never.
   int64_t sharpen_agent_steps = 0;
   /// Path of a saved vector policy that the learner imitates (training/teacher.h), relative to the configuration's
-  /// folder. The loss includes the KL divergence from the teacher's actions times a weight. The weight falls linearly
-  /// from teacher_coef to 0 over teacher_agent_steps.
+  /// folder. The loss includes the KL divergence from the teacher's actions, multiplied by a weight. The weight falls
+  /// linearly from teacher_coef to 0 over teacher_agent_steps.
   std::string teacher;
   double teacher_coef = 1;
   int64_t teacher_agent_steps = 100'000'000;
