@@ -53,9 +53,9 @@ class BorrowedArray {
 };
 
 /// Returns access to an array of a Python caller: a LentArray or any object that supports DLPack (NumPy, torch, JAX,
-/// CuPy). Later work on `stream` waits for pending writes to the array on a device. Throws Error, whose message names
-/// `what`, for other objects, unsupported element types, and devices other than the host and CUDA devices. The caller
-/// must hold the GIL.
+/// CuPy). If the array is on a device, later work on `stream` waits for pending writes to the array. Throws Error,
+/// whose message names `what`, for other objects, unsupported element types, and devices other than the host and CUDA
+/// devices. The caller must hold the GIL.
 BorrowedArray borrow(const py::handle& object, std::string_view what, Stream stream);
 
 /// Variant of borrow() that also accepts NumPy arrays of structs of `size` bytes. The result is then u8 [count, size]

@@ -1,5 +1,5 @@
-// Rules for calls of the library from Python. They run without the GIL. Only one thread at a time may call an object. A
-// child of fork() cannot make calls that need threads or CUDA if its parent has used them.
+// Rules for calls of the library from Python. The calls run without the GIL. Only one thread at a time may call an
+// object. A child of fork() cannot make calls that need threads or CUDA if its parent has used them.
 #pragma once
 
 #include <atomic>
