@@ -33,12 +33,12 @@ std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<cons
                                                Span<const int32_t> replayed, int num_agents);
 
 /// Adapts a configuration to a scene. Sets the recording's time step, episodes from start_step to the end of the
-/// recording without early end, and dynamics multipliers of 1. Removes walls, and parked cars besides the scene's
+/// recording without early end, and dynamics multipliers of 1. Removes walls, and all parked cars except replayed
 /// tracks.
 SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step = 0, SimulatorConfig config = {});
 
-/// Returns a world on a scene's map whose agents are all tracks of the scene. `index` is the index of the map among a
-/// simulator's maps.
+/// Returns a world on a scene's map with one agent for each track. `index` is the index of the map among a simulator's
+/// maps.
 WorldSpec scene_world(const CompiledMap& map, int index = 0, uint32_t global_world = 0);
 
 /// Returns [tracks]: 1 for each selected track, else 0. `words` are separated by commas: self or sdc (the self-driving

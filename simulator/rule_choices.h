@@ -20,8 +20,8 @@ struct DynamicsRules {
 
 constexpr int kMaxOtherPolicies = 8;
 
-/// Shares of the agents that are impaired, or that other policies drive. Each episode draws them again. An agent
-/// belongs to at most one share; all remaining agents learn.
+/// Shares of the agents that are impaired, or that other policies drive. Each episode draws these agents again. An
+/// agent belongs to at most one share; all remaining agents learn.
 struct OtherShares {
   float blind = 0;                         // at times it sees no other road user
   float phantom_braking = 0;               // at times it brakes hard

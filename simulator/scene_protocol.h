@@ -27,8 +27,7 @@ struct SceneProtocol {
   int start_step = 0;                     // step of the recording at which episodes begin
   int steps = 600;
   std::vector<double> densities{1.0, 0.75, 0.5};  // shares of a scene's road users that remain
-  int rollouts = 1;                               // number of times that each scene is driven, each with its own random
-                                                  // draws
+  int rollouts = 1;                               // number of drives per scene, each drive with its own random draws
   float box_scale = 1;                            // factor on the length and width of all boxes
   // Minimum distance from the start to the goal; a road user that starts nearer follows the recording. 0: no minimum.
   float min_distance_to_goal_m = 2;
@@ -67,7 +66,7 @@ void set_scene_rule(const std::string& assignment, SceneProtocol* protocol_inout
 std::vector<std::pair<std::string, std::string>> rules_of(const SceneProtocol& protocol);
 
 /// Throws UsageError, which names the setting, if a setting is invalid. Examples are steps below 1, a density outside
-/// (0, 1], and a word in `control` that names no kind of tracks, such as an id.
+/// (0, 1], and an id or unknown word in `control`.
 void check(const SceneProtocol& protocol);
 
 /// Row of the paper's table on the Waymo Open Motion Dataset (zero-shot self-play, 44,073 scenes of the validation

@@ -170,8 +170,8 @@ class Simulator {
   const SlotTable& slots() const { return arrays_.slots; }
   const ObservationView& observations() const { return arrays_.observations; }
   const SceneBatch& scene() const { return arrays_.scene; }
-  /// One view per slot. The view of an absent agent is at the map's origin, and no agent is excluded from it as the
-  /// ego. It can be drawn like any other view, but its images have no meaning, and its slot is never valid.
+  /// One view per slot. The view of an absent agent is at the map's origin and has no ego, so it excludes no agent. It
+  /// can be drawn like any other view, but its images have no meaning, and its slot is never valid.
   Span<const View> views() const { return arrays_.views; }
   const AgentStateView& state() const { return arrays_.state; }
   Span<const int32_t> episode_step() const { return arrays_.episode_step; }

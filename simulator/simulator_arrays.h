@@ -14,8 +14,8 @@ struct StepResult {
   Span<const float> reward;          // [slots]
   Span<const uint8_t> terminated;    // [slots] 1: an infraction ended the agent's episode in this step
   Span<const uint8_t> truncated;     // [slots] 1: the episode, or a life, ended otherwise: bootstrap
-  Span<const uint8_t> valid;         // [slots] 1: learn from this step: the agent was active when it began, and is not
-                                     // impaired
+  Span<const uint8_t> valid;         // [slots] 1: learn from this step: the agent was active at the step's start, and
+                                     // is neither impaired nor an opponent
   Span<const SpawnFailure> refusal;  // [slots] reason why the agent is absent from this episode, or `none`
   Span<const StepSums> sums;         // [slots] reward terms and distance of the step; 0 if not valid
 };

@@ -67,7 +67,8 @@ struct SimulatorState {
   }
 
  private:
-  /// Size of the saved state without its header, and copies to and from bytes; with or without the fields of lives.
+  /// Size of the saved state without its header, and copying of that state to and from bytes. `with_lives` includes the
+  /// fields of lives.
   size_t saved_bytes(bool with_lives) const;
   void copy_to(uint8_t* bytes_out, bool with_lives) const;
   void assign_from(const uint8_t* bytes, bool with_lives);

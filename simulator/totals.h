@@ -26,7 +26,7 @@ constexpr float kRest_mps = 0.3f;  // agents up to this speed count as at rest
 #define PICTURA_TOTALS(COUNT, SUM, TERMS)                                                       \
   COUNT(agent_steps) /* steps of single active agents */                                        \
   COUNT(slot_steps)  /* number of slots times steps */                                          \
-  COUNT(episodes)    /* worlds reset after their first episode */                               \
+  COUNT(episodes)    /* number of times that a step reset a world */                            \
   PICTURA_EVENT_TOTALS(COUNT)                                                                   \
   SUM(distance_m)                                                                               \
   SUM(reward)                                                                                   \

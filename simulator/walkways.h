@@ -16,9 +16,9 @@ struct Walkways {
   std::vector<int32_t> leaving;      // pieces that leave each node
 };
 
-/// Makes the walkways of a map. Omits pieces on the drivable surface of `roads`, except on crosswalks, and connected
-/// networks with a total length below kMinWalk_m. `roads` needs only its lanes and their cells. The result is empty if
-/// the map has no walkways.
+/// Makes the walkways of a map. Omits pieces on the drivable surface of `roads` (except on crosswalks), and connected
+/// networks whose total length is below kMinWalk_m. `roads` needs only its lanes and their cells. The result is empty
+/// if the map has no walkways.
 Walkways make_walkways(const RoadMap& map, const MapView& roads);
 
 constexpr float kMinWalk_m = 40.0f;

@@ -24,7 +24,7 @@ class DrivenAgent {
   AgentBox box(Vec3 axle_m, float heading_rad, float margin_m) const;
   /// Whether the agent's box at this motion and height, enlarged by a margin on every side, is partly off the road.
   bool leaves_road(const Motion& at, float z_m, float margin_m) const;
-  /// Whether the front bumper crosses an exit in a step at height z_m. The agent then leaves the map.
+  /// Whether the front bumper crosses an exit at height z_m in a step, so that the agent leaves the map.
   bool crosses_exit(const Motion& before, const Motion& after, float z_m) const;
   /// Returns the distance from the rear axle to the front bumper.
   float to_bumper_m() const;

@@ -17,8 +17,8 @@ RoutePoint start_place(const WorldView& world, int agent);
 /// Returns the waypoints of chain `chain` of the agent's life. The chain starts at `from`.
 std::array<RoutePoint, kNumWaypoints> goal_places(const WorldView& world, int agent, uint32_t chain, RoutePoint from);
 
-/// Converts `at` to a position on the lane graph. The lengths of its lanes differ by rounding errors from those of the
-/// map's rules.
+/// Converts `at` to a position on the lane graph. The graph's lane lengths differ from those of `map` by rounding
+/// errors.
 LanePosition lane_place(const MapView& map, const LaneGraph& graph, RoutePoint at);
 
 struct GoalReach {
@@ -28,7 +28,7 @@ struct GoalReach {
 /// Tests the first `chains` chains of every active agent of a world before its first step. Element 0 of the result
 /// counts vehicles and cyclists, element 1 pedestrians. A waypoint on a lane is reachable if the lane graph has a route
 /// of at most 120 m to it from the previous waypoint. A waypoint on a walkway is reachable if no wall or parked car
-/// covers it and pieces of walkways lead to it on which a pedestrian of maximum size touches no wall.
+/// covers it, and if a pedestrian of maximum size can follow walkways to it without touching a wall.
 std::array<GoalReach, 2> follow_goals(const WorldView& world, const LaneGraph& graph, uint32_t chains);
 
 }  // namespace pictura

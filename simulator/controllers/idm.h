@@ -24,8 +24,8 @@ struct IdmParameters {
   float look_ahead_m = 10;
 };
 
-/// Returns the acceleration for a gap to the road user in front and its speed. An infinite gap means that there is no
-/// road user in front.
+/// Returns the acceleration at speed_mps behind a road user that is gap_m ahead and has the speed front_mps. An
+/// infinite gap means that there is no road user in front.
 float idm_acceleration(const IdmParameters& parameters, float speed_mps, float gap_m, float front_mps);
 
 /// Path of an agent: positions of its reference point with headings. Each position is at least kMinPiece_m from the
@@ -50,10 +50,11 @@ struct FollowedPath {
 };
 
 /// Returns a path from a pose to the centre line of the lane and along the following lanes, for 200 m or to the end of
-/// the lanes. At a fork, the path takes the straightest successor among those on which routes may continue
-/// (MapLane::num_successors), if there are any. At a lane without successors, the path changes to the nearest lane
-/// beside it that has successors. If there is no room for the change, the path ends where the front bumper, front_m
-/// ahead of the reference point, is still before the lane's end. If `lane` is -1, the path consists of the pose alone.
+/// the lanes. At a fork, the path takes the straightest successor on which routes may continue
+/// (MapLane::num_successors). If there is none, it takes the straightest of all successors. At a lane without
+/// successors, the path changes to the nearest lane beside it that has successors. If there is no room for the change,
+/// the path ends where the front bumper, front_m ahead of the reference point, is still before the lane's end. If
+/// `lane` is -1, the path consists of the pose alone.
 FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m, float heading_rad, float front_m);
 
 enum class IdmPaths {
@@ -61,11 +62,11 @@ enum class IdmPaths {
   lanes,   // along lanes for all vehicles and cyclists
 };
 
-/// Moves every commanded agent along its path with kinematic_state commands. The model's road user in front is the
-/// first box that the agent's box would touch on the next look_ahead_m of its path. An agent continues from its current
-/// position and speed, and stops at the end of its path. Along lanes, the desired speed is at most the lane's speed
-/// limit. Stop lines are standing obstacles if their light is red, or if it is yellow and the agent can still brake.
-/// Pedestrians without a record stand still.
+/// Moves every commanded agent along its path with kinematic_state commands. The road user in front is the first box
+/// that the agent's box would touch on the next look_ahead_m of the path. An agent continues from its current position
+/// and speed, and stops at the end of its path. Along lanes, the desired speed is at most the lane's speed limit. Stop
+/// lines are standing obstacles if their light is red, or if it is yellow and the agent can still brake. Pedestrians
+/// without a record stand still.
 class IdmController final : public Controller {
  public:
   explicit IdmController(const Simulator& simulator, IdmPaths paths = IdmPaths::logged,

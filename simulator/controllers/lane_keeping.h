@@ -1,8 +1,8 @@
 // The lane keeper: a controller for vehicles and cyclists in traffic. An agent drives through its waypoints, stops at
 // red lights and behind other road users, and gives way when it changes lanes. It keeps enough distance to stop even if
 // the road user in front halts within one step. It follows the centre lines of lanes by pure pursuit. Long vehicles cut
-// corners: if the agent would leave the road, it searches a plan that stays on the road; if it finds no plan, it stops.
-// Runs only on the host.
+// corners: if the agent would leave the road, it searches for a plan that stays on the road; if it finds none, it
+// stops. Runs only on the host.
 #pragma once
 
 #include <array>

@@ -1,6 +1,5 @@
-// Search for a plan (a sequence of actions) with which an agent stays on the road where it would leave the road by
-// following its path. Because the search simulates the agent's motion, plans can swing out before tight curves and
-// avoid kerbs.
+// Search for a plan: a sequence of actions that keeps an agent on the road where it would leave the road by following
+// its path. Because the search simulates the agent's motion, plans can swing out before tight curves and avoid kerbs.
 #pragma once
 
 #include <cstddef>

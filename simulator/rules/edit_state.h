@@ -66,7 +66,8 @@ struct AgentRecord {
   }
 };
 
-/// Returns a copy of the agent of the edit's element i with the edit applied. Derived fields are not recomputed.
+/// Returns a copy of the agent that element i of the edit changes, with the edit applied. Derived fields are not
+/// recomputed.
 PICTURA_HD inline AgentRecord edited_agent(const AgentStateView& agents, const StateEdit& edit, int i) {
   AgentRecord record;
   copy_fields(agents, edit.slots[i], record.view(), 0);

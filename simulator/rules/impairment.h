@@ -1,6 +1,5 @@
-// Agents that are impaired or driven by other policies: their random choice for each episode, the times at which
-// impairments are active, and their effects. All of this is computed from counter-based random numbers, so the state
-// does not store it.
+// Agents that are impaired or driven by other policies: how each episode draws them, when impairments are active, and
+// what impairments do. All of this is computed from counter-based random numbers, so the state does not store it.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -44,7 +43,7 @@ PICTURA_HD inline Impairment draw_impairment(const OtherShares& shares, uint64_t
   return impairment_of(draw_driver_kind(shares, seed, world, agent, episode));
 }
 
-/// Whether an agent's impairment is active after `step` steps of the episode, in its observation and its next action.
+/// Whether an impairment affects the agent's observation and next action after `step` steps of the episode.
 /// `inattentive` is always active. The other impairments are active once in every period of 10 s, for U(1, 5) s from a
 /// random time on.
 PICTURA_HD inline bool is_active_at(Impairment impairment, int step, float dt_s, uint64_t seed, uint32_t world,

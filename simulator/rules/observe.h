@@ -76,8 +76,8 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
     if (is_near && found < 2 * kMaxPartners) continue;
     Nearest nearest;
     if constexpr (ThreadGroup::kSize == 1) {
-      // Boxes of consecutive rows of cells are contiguous. If there are few, one loop reads all rows, including boxes
-      // outside the range's columns.
+      // Boxes of consecutive rows of cells are contiguous. If these are few boxes, one loop reads all rows at once,
+      // including boxes outside the range's columns.
       const bool at_once = range.end(cells, range.y1) - range.begin(cells, range.y0) <= kFew;
       for (int y = range.y0; y <= range.y1; ++y) {
         const int32_t begin = range.begin(cells, y);

@@ -11,7 +11,7 @@ namespace pictura {
 constexpr int32_t kRecordedGoal = 1, kRecordedGoalReached = 2;
 
 /// Returns the recorded state of an agent `step` steps after its episode's start. After the record's end, it is the
-/// last state with speed 0.
+/// last recorded state, but with speed 0.
 PICTURA_HD inline RecordedState recorded_state(const MapView& map, int agent, int step) {
   const int last = map.recorded_steps - 1;
   RecordedState state = map.recorded_states[static_cast<size_t>(agent) * static_cast<size_t>(map.recorded_steps) +

@@ -114,8 +114,8 @@ PICTURA_HD inline Span<const int32_t> successors_of(const MapView& map, int32_t 
   return map.successors.subspan(from.first_successor, from.num_all_successors);
 }
 
-/// Whether lane `to` follows lane `from`, directly or after one lane in between, because an agent can pass a short lane
-/// within a step.
+/// Whether lane `to` follows lane `from`, directly or after one lane in between: an agent can pass a short lane within
+/// a step.
 PICTURA_HD inline bool follows(const MapView& map, int32_t from, int32_t to) {
   const Span<const int32_t> next = successors_of(map, from);
   for (size_t i = 0; i < next.size(); ++i) {

@@ -219,7 +219,7 @@ PICTURA_HD inline AgentBox parked_box(const WorldView& world, int car, const Par
   return box;
 }
 
-/// Whether the box extends by more than kSeamTolerance_m into a lane on its level on which agents drive.
+/// Whether the box extends by more than kSeamTolerance_m into a driven lane (LaneSegment::is_driven) on its level.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
   const OrientedBox print = footprint(box);
@@ -296,8 +296,8 @@ PICTURA_HD inline AgentBox spawn_box(const WorldView& world, int agent, int i) {
   return box_at(world.agents, world.first_slot + agent, pose.position_m, sincos_of(pose.heading_rad));
 }
 
-/// Whether the map permits an agent's box: it touches no barrier and its centre is on the road. The box of a pedestrian
-/// need only touch no wall.
+/// Whether the map permits an agent's box: it must touch no barrier and have its centre on the road. A pedestrian's box
+/// has only one condition: it must touch no wall.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool fits_map(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
   if (box.agent_class == AgentClass::pedestrian) return !touches_wall(map, box, group);

@@ -48,8 +48,7 @@ struct WorldView {
   GridView box_cells;                // indices of visible boxes, by the cell of their centres
   Vec2* cell_centers = nullptr;      // [num_boxes] centres of the boxes of box_cells.items, in that order
   LightPlan* light_plans = nullptr;  // [stop lines]
-  LightState* lights = nullptr;      // [stop lines] states that agents observe before the step; they hold during the
-                                     // step
+  LightState* lights = nullptr;      // [stop lines] states during the step, which agents observe before it
 };
 
 PICTURA_HD inline Motion motion_of(const AgentStateView& agents, int slot) {
