@@ -24,8 +24,8 @@ void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels
 void bias_gelu_backward(const float* slope, const float* grad_out, int64_t rows, int64_t channels, float* grad_x_out,
                         float* bias_grad_inout);
 
-/// Computes out = layer norm of x + bias over channels, without parameters, with an epsilon of 1e-5. Also computes the
-/// reciprocal of each row's standard deviation, [rows], if inverse_deviations_out is not null. x, out: [rows,
+/// Computes out = layer norm of (x + bias) over channels, without parameters, with an epsilon of 1e-5. Also computes
+/// the reciprocal of each row's standard deviation, [rows], if inverse_deviations_out is not null. x, out: [rows,
 /// channels]; out may be x. bias: [channels].
 void bias_norm(const float* x, const float* bias, int64_t rows, int64_t channels, float* out,
                float* inverse_deviations_out);

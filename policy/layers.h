@@ -17,14 +17,14 @@ at::Tensor linear_gelu(const at::Tensor& x, const at::Tensor& weight, const at::
 /// autocast.
 at::Tensor normalize(const at::Tensor& x);
 
-/// Returns GELU(layer norm without parameters(linear layer of x)). Shapes as in linear_gelu().
+/// Returns GELU(normalize(linear layer of x)). Shapes as in linear_gelu().
 at::Tensor linear_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias);
 
 /// Returns GELU(convolution of x), where x is padded by half the kernel. x: [n, in, height, width]; weight: [out, in,
 /// kernel, kernel]; bias: [out]. The weight may have fewer input channels than x if the additional channels of x are 0.
 at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride);
 
-/// Returns the layer norm of x + position over the last dimension. x: [..., period, channels]; position: [period,
+/// Returns the layer norm of (x + position) over the last dimension. x: [..., period, channels]; position: [period,
 /// channels], or undefined for none; weight, bias: [channels].
 at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tensor& weight, const at::Tensor& bias);
 

@@ -129,7 +129,7 @@ struct Decision {
   bool is_finite() const { return are_finite().item<bool>(); }
 };
 /// Runs the policy, chunk by chunk, for the agents with row numbers `rows`, i64 [batch]. act(rows) must return the
-/// policy's output for the rows of a chunk. The output must be valid only until the next call.
+/// policy's output for the rows of a chunk. The output may become invalid at the next call.
 Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
                 const std::function<Policy::Output(const at::Tensor& rows)>& act);
 

@@ -36,8 +36,8 @@ struct PolicyInput {
   bool hides_auxiliary = false;
 };
 
-/// Controller that drives agents with a policy. On a device, act() waits for two numbers: of the agents that it drives,
-/// and of the agents that choose a new action.
+/// Controller that drives agents with a policy. On a device, act() waits for two counts: of the agents that it drives,
+/// and of those that choose a new action.
 class PolicyController : public Controller {
  public:
   /// Number of agents that the last act() commanded: the active agents that its mask selects.
@@ -48,8 +48,7 @@ class PolicyController : public Controller {
 /// a rig file and an image size. Throws Error as load_rig() does.
 std::optional<Rig> named_rig(const SessionOptions& options);
 
-/// Returns renderer_config() of a configuration for evaluations. Randomized cameras of a world are then the same for
-/// all policies.
+/// Variant of renderer_config() for evaluations: randomized cameras of a world are the same for all policies.
 RendererConfig evaluation_renderer_config(const Config& config, const Rig& rig, Device device);
 
 /// Session with a policy. Only one thread may use it at a time. In builds with torch, torch computes the policy; in

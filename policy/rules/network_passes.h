@@ -124,8 +124,8 @@ class NetworkPasses {
   NetworkPasses(const NetworkPasses&) = delete;
   NetworkPasses& operator=(const NetworkPasses&) = delete;
 
-  /// Whether bias_gelu() (supports_gelu()), or norm() and bias_norm_gelu() (supports_norm()), support rows with this
-  /// number of channels.
+  /// Whether rows may have this number of channels: supports_gelu() for bias_gelu(), supports_norm() for norm() and
+  /// bias_norm_gelu().
   static constexpr bool supports_gelu(int64_t channels) { return channels % 8 == 0 && channels <= 1024; }
   static constexpr bool supports_norm(int64_t channels) {
     return channels % 64 == 0 && channels <= 512 && channels != 320 && channels != 448;
@@ -139,7 +139,7 @@ class NetworkPasses {
                                   void* grad_x_out, float* grad_bias_sums_out, Stream stream) = 0;
   static constexpr int64_t kBiasSums = 528;
 
-  /// Computes out = GELU(layer norm of x + bias). The norm is over channels, without parameters, with an epsilon of
+  /// Computes out = GELU(layer norm of (x + bias)). The norm is over channels, without parameters, with an epsilon of
   /// 1e-5.
   virtual void bias_norm_gelu(const ActivationSize& size, const void* x, const float* bias, void* out,
                               Stream stream) = 0;
@@ -148,7 +148,7 @@ class NetworkPasses {
                                        const void* grad_out, void* grad_x_out, float* grad_bias_sums_out,
                                        Stream stream) = 0;
 
-  /// Computes out = layer norm of x + position, over channels, with an epsilon of 1e-5. weight, bias: [channels].
+  /// Computes out = layer norm of (x + position) over channels, with an epsilon of 1e-5. weight, bias: [channels].
   /// position: [period, channels], where row r uses position r % period; null for none, with period 1.
   virtual void norm(const ActivationSize& size, const void* x, const void* position, int64_t period,
                     const float* weight, const float* bias, void* out, Stream stream) = 0;
