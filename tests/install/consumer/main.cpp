@@ -1,4 +1,4 @@
-// Draws a street with a car to car.png, as seen by the front camera of a second car behind it.
+// Writes car.png: a street with a car, seen by the front camera of a car behind it.
 #include <cstdio>
 
 #include "pictura/backends/make_renderer.h"
