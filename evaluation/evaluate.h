@@ -82,8 +82,8 @@ struct EvaluationWorlds {
 /// Compiles the options' maps for worlds of the configuration `world`.
 CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world);
 
-/// Evaluates the policy or controller of the options. Scenario k uses map k modulo the number of maps. It draws its
-/// random numbers as world kFirstEvaluationWorld + k, so it differs from every training world at any seed. Throws Error
+/// Evaluates the policy or controller of the options. Scenario k uses map k modulo the number of maps, and draws random
+/// numbers as world kFirstEvaluationWorld + k. So no scenario equals a training world, whatever the seeds. Throws Error
 /// naming file and key for bad input.
 EvaluateReport evaluate(const EvaluateOptions& options);
 /// Evaluates a session's policy, with the session's own device, renderer and cameras.

@@ -47,7 +47,7 @@ struct Infraction {
   float speed_mps = 0, lane_offset_m = 0, lane_angle_rad = 0;
   RoadShape shape = RoadShape::no_lane;
   bool changed_lane = false;  // whether the agent moved to a neighbouring lane within the last 3 s
-  bool before_merge = false;  // outside junctions: whether the lane ends within 30 m where another lane joins
+  bool before_merge = false;  // outside junctions: whether the lane merges with another lane within 30 m
   // Set for collisions only:
   CollisionPartner partner = CollisionPartner::none;
   PartnerMotion partner_motion = PartnerMotion::none;

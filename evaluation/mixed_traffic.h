@@ -1,4 +1,5 @@
-// Mixed traffic: evaluations in which other saved policies, of any kind, or controllers drive some of the vehicles.
+// Mixed traffic: evaluations in which other drivers (controllers, or saved policies of any kind) drive some of the
+// vehicles.
 #pragma once
 
 #include <cstdint>

@@ -35,8 +35,8 @@ class EvaluationClock {
   double first_s_ = -1, first_fraction_ = 0;
 };
 
-/// Returns the progress callback of one of `count` equally long parts, when `finished` parts are complete. The callback
-/// reports the progress of all parts together to on_progress, which must outlive it.
+/// Returns a progress callback for the next of `count` equally long parts, of which `finished` are complete. The
+/// callback reports the progress of all parts together to on_progress, which must outlive the callback.
 inline std::function<void(double, double)> progress_of_part(const std::function<void(double, double)>& on_progress,
                                                             std::ptrdiff_t finished, std::ptrdiff_t count) {
   return [&on_progress, finished, count](double done, double eta_s) {

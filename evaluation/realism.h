@@ -26,7 +26,7 @@ struct RealismTerm {
   double smoothing = 0;      // added to the count of every bin
 };
 
-/// Weights and bins of the Waymo Open Sim Agents Challenge of one year.
+/// Weights and bins of one year's Waymo Open Sim Agents Challenge.
 struct RealismVersion {
   std::string name;
   std::array<RealismTerm, kNumRealismFeatures> terms;  // indexed by RealismFeature
@@ -48,7 +48,7 @@ struct SceneRealism {
   // Likelihoods in (0, 1]. pooled: the exponential of the mean log-likelihood over all road users and steps. by_object:
   // for each road user, the exponential of its mean log-likelihood over its steps; then the mean over road users.
   RealismLikelihoods pooled, by_object;
-  double score = 0, score_by_object = 0;  // weighted means over features of pooled and by_object, without NaN
+  double score = 0, score_by_object = 0;  // means of pooled and by_object, weighted over features; without NaN
   double ade_m = 0, min_ade_m = 0;        // mean displacement of all road users: mean and minimum over rollouts
   // Shares of scored road users that have the event in rollouts, and in the recording.
   double collision_rate = 0, off_road_rate = 0, red_light_rate = 0;

@@ -33,8 +33,8 @@ bool has_drivers(const CompiledMap& map, const SceneProtocol& protocol);
 ScenePlan plan_scene(const CompiledMap& map, Span<const AgentBox> boxes, const SceneProtocol& protocol, double density,
                      uint64_t seed);
 
-/// Returns the waypoints of a driven track for Waypoints::path. The first two are points of its recorded path from the
-/// takeover on, after one third and two thirds of the path's length. The last is the goal.
+/// Returns the waypoints of a driven track for Waypoints::path. The first two are at one third and two thirds of its
+/// recorded path after the takeover. The last is the goal.
 std::vector<Vec3> path_waypoints(const CompiledMap& map, int32_t track, int32_t takeover_step);
 
 }  // namespace pictura

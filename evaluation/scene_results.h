@@ -42,7 +42,7 @@ struct SceneCounts {
   }
 };
 
-/// Counts of an evaluation in num_scenes scenes of its setting, from the scene first_scene on.
+/// Counts of an evaluation. It covers num_scenes of the setting's scenes, beginning with the scene first_scene.
 struct SceneResults {
   EvaluationSetting setting;  // `maps` holds SceneEvaluateOptions::scenes
   SceneProtocol protocol;

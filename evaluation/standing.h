@@ -32,7 +32,7 @@ class StandingObserver final : public StepObserver {
 
   Simulator& simulator_;
   int step_ = 0;
-  std::vector<int32_t> awaited_light_;   // [slots] index in its world of the light at which the vehicle waits; -1: none
+  std::vector<int32_t> awaited_light_;   // [slots] light at which the vehicle waits, as index in its world; -1: none
   std::vector<Progress> progress_;       // [slots]
   std::vector<uint8_t> driver_of_slot_;  // [slots]
   std::vector<std::vector<StandingCounts>> counts_;  // [drivers][worlds]

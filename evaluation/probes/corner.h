@@ -1,6 +1,6 @@
 // Probe of blind corners (paper, "Closed-loop driving reveals occlusion-aware behavior"). It compares how policies
-// approach two kinds of corners: walls hide a vehicle that comes from the corner, or no vehicle comes. Includes no
-// torch headers.
+// approach corners at which walls hide a crossing vehicle with how they approach empty corners. Includes no torch
+// headers.
 #pragma once
 
 #include "pictura/evaluation/probes/corner_results.h"
@@ -50,8 +50,8 @@ void visit_options(CornerOptions& options, Visitor&& v) {
 /// state with a hidden vehicle is kept if that vehicle enters the junction within kTakeoverSteps and the ego sees no
 /// part of it. Renderer::visibility decides this, in the cameras of the first policy that reads images, or in the
 /// paper's cameras if no policy reads images. All states, with and without a hidden vehicle, are kept only if their
-/// scene lasts kTakeoverSteps more steps. match_corners() pairs states with a hidden vehicle with similar states
-/// without one.
+/// scene lasts kTakeoverSteps more steps. Each pair of match_corners() is a state with a hidden vehicle and a similar
+/// state without one.
 /// Each policy then drives the ego for kTakeoverSteps (TakeoverWorlds) from three states: the state with the hidden
 /// vehicle, this state after removal of the vehicle, and the similar state. Each run takes place in a world with walls
 /// and in a world without walls. `batch` pairs run together. An interrupt ends the probe with the completed pairs.

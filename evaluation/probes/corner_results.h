@@ -44,7 +44,7 @@ struct CornerScene {
 struct CornerResults : ProbeResults {
   CornerSearch search;
   CornerControl control = CornerControl::none;
-  int64_t pairs_asked = 0, hidden_found = 0, empty_found = 0;  // numbers of states found, before matching
+  int64_t pairs_asked = 0, hidden_found = 0, empty_found = 0;  // found: numbers of states before matching
   std::vector<CornerPair> pairs;             // ordered by scene, step, ego and user of the hidden state
   std::vector<CornerScene> scenes_of_pairs;  // [pairs] scene of the hidden state
   std::vector<Takeover> takeovers;           // [pairs, walls on and off, cases, policies]
@@ -56,9 +56,9 @@ struct CornerResults : ProbeResults {
   }
 };
 
-/// Reveal of a run: the step at which the ego's line of sight to the hidden vehicle opens, or to the place where the
-/// vehicle would be if it was not removed. At an empty corner, the reveal is at the step of the same policy's reveal in
-/// the run from the pair's hidden state.
+/// Reveal of a run: the step at which the ego's line of sight opens to the hidden vehicle, or to the place where the
+/// removed vehicle would be. At an empty corner, it is the step of the reveal in the same policy's run from the pair's
+/// hidden state.
 struct Reveal {
   int32_t step = 0;
   std::optional<float> distance_m;  // from ego to hidden vehicle, between the boxes' centres

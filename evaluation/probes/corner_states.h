@@ -1,5 +1,5 @@
 // Search for states in which an ego (the vehicle that policies take over) approaches a blind corner. In some of the
-// states a vehicle comes that walls hide; in similar states no vehicle comes. Includes no torch headers.
+// states walls hide a vehicle on a crossing lane; in similar states no vehicle comes. Includes no torch headers.
 #pragma once
 
 #include <map>

@@ -32,8 +32,8 @@ struct CrossingPath {
   InsertedBox pedestrian(int i, float height_m) const;
 };
 
-/// Returns six paths whose origin is just behind a box, as seen from `eye_m`. They are at right angles to the line of
-/// sight, or turned from there by 30 degrees to either side; each occurs in both directions.
+/// Returns six paths whose origin is just behind a box, as seen from `eye_m`. They cross the line of sight at 60, 90
+/// and 120 degrees, each in both directions.
 std::vector<CrossingPath> paths_behind(const AgentBox& box, Vec2 eye_m);
 
 /// Returns for each point whether a pedestrian could stand there, [kPathPoints]: no drawn box and no wall on the path's

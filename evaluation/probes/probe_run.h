@@ -50,7 +50,7 @@ struct ProbeFrame {
   }
 };
 
-/// Scene on the host whose worlds are copies from frames of any steps.
+/// Scene on the host. Its worlds are copied from frames, which may be of different steps.
 struct KeptScene {
   std::vector<int32_t> world_begin{0}, light_begin{0}, hidden;
   std::vector<AgentBox> boxes;
@@ -59,8 +59,8 @@ struct KeptScene {
 
   /// Adds a world, followed by inserted boxes.
   void add_world(const ProbeFrame& frame, size_t world, Span<const InsertedBox> inserted = {});
-  /// Both return an index in this scene of a box of the last added world: the box with index `box_of_frame` in the
-  /// frame, and the first inserted box.
+  /// Return a box's index in this scene. The box belongs to the last added world: for box_of() it is box `box_of_frame`
+  /// of the frame, for first_inserted() the first inserted box.
   int32_t box_of(const ProbeFrame& frame, size_t world, int32_t box_of_frame) const {
     return box_of_frame - frame.box_begin[world] + world_begin[geometry.size() - 1];
   }
@@ -72,8 +72,8 @@ struct KeptScene {
   View view_of(const ProbeFrame& frame, size_t world, int32_t slot, const std::vector<int32_t>& without);
 };
 
-/// Agent of a frame, observed in two states that differ by one box. Either hidden_box is hidden in the second state, or
-/// `inserted` is inserted in the first state, or the states are equal.
+/// Agent of a frame, observed in two states that differ by at most one box. Either hidden_box is hidden in the second
+/// state, or `inserted` is inserted in the first state, or the states are equal.
 struct ProbePair {
   size_t world = 0;
   int32_t slot = 0;

@@ -1,4 +1,4 @@
-// Takeovers: a policy drives an ego from a state of a driven scene on, while all other agents repeat their motion of
+// Takeovers: from a state of a driven scene on, a policy drives an ego, while all other agents repeat their motion of
 // that scene. Includes no torch headers.
 #pragma once
 
