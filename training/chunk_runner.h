@@ -48,7 +48,7 @@ class ChunkRunner {
   /// Phase::learn.
   Policy::Output forward_no_grad(const at::Tensor& rows);
 
-  /// Sets the targets of the losses that follow.
+  /// Sets the targets of subsequent losses.
   void set_targets(const Targets& targets);
   /// Adds the gradient of this rank's part of a minibatch's loss to the parameters' gradients, which must be defined.
   /// Computes it in chunks of at most forward_chunk rows. The time counts as Phase::learn and Phase::backward. Returns

@@ -12,8 +12,8 @@ struct GradientNorms {
   double policy = 0, value = 0, entropy = 0;
 };
 
-/// Measures the gradients of single losses, only for the log, on the first transitions of an update. Their number is so
-/// small that one forward and three backward passes are at most 3 % of the update's work.
+/// Measures, only for the log, the gradients of single losses. It uses the first transitions of an update, and so few
+/// of them that one forward and three backward passes are at most 3 % of the update's work.
 class GradientDiagnosis {
  public:
   /// Measures on `first`, the first of `minibatches`, whose advantages must be set. The parameters' gradients must be

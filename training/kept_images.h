@@ -12,7 +12,8 @@ namespace pictura {
 /// halted agents, take no memory.
 class KeptImages {
  public:
-  /// Allocates memory for `capacity` images of the rig, which grows if necessary. There are num_steps * num_slots rows.
+  /// Allocates memory for `capacity` images of the rig; the memory grows if necessary. There are num_steps * num_slots
+  /// rows.
   KeptImages(const Rig& rig, int64_t num_steps, int64_t num_slots, int64_t capacity, Device device);
 
   /// Stores the images of `slots`, i64 [n], at `step`. images: blocks [n, cameras, ...]. Step 0 discards all previous

@@ -18,8 +18,9 @@ struct Minibatch {
   Minibatch part(const Chunk& chunk) const;
 };
 
-/// Transitions of a rollout in the order of an epoch, split into minibatches of equal size (within one transition).
-/// Order and minibatches do not depend on the number of ranks. Each rank holds only its own transitions of a minibatch.
+/// Transitions of a rollout in the order of an epoch, split into minibatches whose sizes differ by at most one
+/// transition. Order and minibatches do not depend on the number of ranks. Each rank holds only its own transitions of
+/// a minibatch.
 class Minibatches {
  public:
   /// Creates minibatches of at most max_size transitions over all ranks. rows: i64 [n], this rank's transitions in

@@ -24,7 +24,7 @@ class Opponents {
   Opponents(const Opponents&) = delete;
   Opponents& operator=(const Opponents&) = delete;
 
-  /// Adds the observation arrays that the opponents read to a simulator's configuration.
+  /// Adds to a simulator's configuration the observation arrays that the opponents read.
   void add_arrays(SimulatorConfig* config_inout) const;
   /// Prepares to drive in the run's simulator, which must outlive this object.
   void enter(const Simulator& simulator);

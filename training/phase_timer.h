@@ -1,5 +1,5 @@
-// Measures the time of an update by phase: with a clock on the host, and with CUDA events on a GPU, without waiting for
-// it.
+// Measures the time of an update by phase: with a clock on the host, and with CUDA events on a GPU. Measuring does not
+// wait for the GPU.
 #pragma once
 
 #include <memory>

@@ -17,9 +17,9 @@ struct AdvantageFilter {
   double average = -1;  // average over rollouts of the largest |advantage| or a quantile; negative at first
 };
 
-/// Upper bounds of the difference between a rollout's log-probabilities and the learner's before the first step, when
-/// only rounding makes them differ. The first bounds the mean absolute difference, the second the share of ratios
-/// outside the clip range. Larger differences cause the log-probabilities to be recomputed.
+/// Upper bounds of the differences that rounding causes, before the first step, between a rollout's log-probabilities
+/// and the learner's. The first bounds the mean absolute difference, the second the share of ratios outside the clip
+/// range. Larger differences cause the log-probabilities to be recomputed.
 constexpr double kMaxAbsLogRatio = 1e-3, kMaxClipFraction = 1e-3;
 
 /// Statistics of an update.

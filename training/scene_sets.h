@@ -69,7 +69,7 @@ class SceneSets {
   std::set<size_t> unusable_;  // scenes that cannot be used
   std::vector<std::string> new_notices_;
   int64_t next_number_ = -1;
-  std::future<SceneSet> next_;  // set number next_number_, if this is valid
+  std::future<SceneSet> next_;  // set number next_number_, if the future is valid
 };
 
 }  // namespace pictura

@@ -15,8 +15,8 @@ double learning_rate_at(const TrainSection& config, int64_t agent_steps);
 bool schedule_has_ended(const TrainSection& config, int64_t agent_steps);
 
 /// Returns the factor by which logits are multiplied after an update of this number of agent-steps. Logits double every
-/// sharpen_agent_steps, as if the softmax's temperature halved. A policy whose agents start moving only by chance must
-/// then learn to start reliably, so its most likely actions become the learnt behaviour.
+/// sharpen_agent_steps, as if the softmax's temperature halved. Agents that start moving only by chance then wait
+/// longer, so the policy must learn to make starting its most likely action.
 double logit_growth(const TrainSection& config, int64_t agent_steps);
 
 /// Returns the weight of the KL divergence from the teacher's actions in an update that starts after `agent_steps`. The

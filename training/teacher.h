@@ -11,12 +11,12 @@ namespace pictura {
 
 class Teacher {
  public:
-  /// Creates the teacher of a learner of `config`, on `device`. Throws Error naming the teacher's file if it reads
-  /// images. Also throws if both policies read vectors and only one of them reads auxiliary slots (observed numbers
-  /// that no image shows).
+  /// Creates the teacher of a learner of `config`, on `device`. Throws Error naming the teacher's file if the teacher
+  /// reads images. Also throws if both policies read vectors and only one of them reads auxiliary slots (observed
+  /// numbers that no image shows).
   Teacher(const SavedPolicy& saved, const Config& config, Device device);
 
-  /// Adds the observation arrays that the teacher reads to a simulator's configuration.
+  /// Adds to a simulator's configuration the observation arrays that the teacher reads.
   void add_arrays(SimulatorConfig* config_inout) const;
 
   /// Returns the log-probabilities of all actions for the agents of `slots`, i64 [n], from the simulator's current

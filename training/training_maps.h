@@ -17,7 +17,7 @@ std::vector<WorldSpec> draw_training_worlds(const Config& config);
 /// for recorded scenes.
 SimulatorConfig training_world(const Config& config, Device device);
 
-/// Returns the names for load_maps() of the maps of draw_training_worlds(): first simulator.maps, then their copies
+/// Returns the names of the training maps, for load_maps(): first simulator.maps, then their copies
 /// (simulator.map_copies), without copies that no world uses.
 std::vector<std::string> training_maps(const Config& config);
 

@@ -18,7 +18,7 @@ bool any_rank(bool is_so, Communicator* communicator);
 /// Returns whether any rank was interrupted. If so, this rank counts as interrupted too (common/support/interrupt.h).
 bool any_rank_interrupted(Communicator* communicator);
 
-/// Returns the bytes of a file of a checkpoint or of weights. Only rank 0 reads the file.
+/// Returns the bytes of a checkpoint file or weights file. Only rank 0 reads the file.
 std::string file_of_first(const std::string& path, Communicator* communicator);
 
 }  // namespace pictura

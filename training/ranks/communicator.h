@@ -55,7 +55,7 @@ Communicator* single_communicator();
 
 /// Creates the communicator of these ranks. A single rank uses single_communicator(). Several ranks use Gloo if they
 /// learn on hosts, or NCCL if they learn on CUDA devices, each on its own device. Throws Error if this build or this
-/// machine lacks the library. `ranks` must outlive it.
+/// machine lacks the library. `ranks` must outlive the result.
 std::unique_ptr<Communicator> make_communicator(Ranks* ranks, Device device);
 
 /// Creates a Gloo or NCCL communicator of any number of ranks.

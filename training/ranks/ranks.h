@@ -58,7 +58,7 @@ class Ranks {
   /// Sets the time without a step after which a rank is considered to hang. Runs with long steps need a longer time.
   void set_no_progress_s(double seconds) { no_progress_s_ = seconds; }
 
-  /// Scope in which this process takes no step for long without being considered to hang.
+  /// Scope of long work: within it, this process is not considered to hang even if it takes no step.
   class LongWork {
    public:
     explicit LongWork(Ranks* ranks) : ranks_(ranks) { ++ranks_->busy_; }

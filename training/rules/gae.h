@@ -1,17 +1,20 @@
 // Generalized advantage estimation (Schulman et al., 2016) with next-step autoreset, for actions that may be held for
-// several steps. These are the steps of a recursion over one slot, from its last step to its first. Callers loop over
-// slots and steps.
+// several steps. gae_advantage() is one step of a recursion over a slot's steps, from the last to the first. Callers
+// loop over slots and steps.
 #pragma once
 
 #include "pictura/common/span.h"
 
 namespace pictura {
 
-/// One step of one agent. - A terminated step does not bootstrap. - A truncated step bootstraps from the value of the
-/// next row, which belongs to the final observation. The next step resets the world, so its transition is not valid. No
-/// advantage crosses the end of an episode. - An invalid step (its agent had halted, or its world was being reset) has
-/// the advantage 0. Earlier steps bootstrap from its value. - A step without a decision continues the previous step's
-/// action. It has the advantage 0, and its reward is part of the return of the last decision.
+/// One step of one agent.
+/// - A terminated step does not bootstrap.
+/// - A truncated step bootstraps from the value of the next row, which belongs to the final observation. The next step
+///   resets the world, so its transition is not valid. No advantage crosses the end of an episode.
+/// - An invalid step (its agent had halted, or its world was being reset) has the advantage 0. Earlier steps bootstrap
+///   from its value.
+/// - A step without a decision continues the previous step's action. It has the advantage 0, and its reward is part of
+///   the return of the last decision.
 struct GaeTransition {
   float reward, value, next_value;
   bool is_terminated, is_truncated, is_valid, is_decision;
