@@ -24,8 +24,8 @@ std::string first_difference_of_ranks(const Config& first, const Config& other);
 /// the optimizer.
 std::vector<std::string> differences_to_report(const Config& saved, const Config& now);
 
-/// Returns the keys, with their values as in to_toml(), that determine the counts of an evaluation and that no option
-/// of the evaluation replaces. They are keys of the worlds, and keys of the policy if has_policy.
+/// Returns the keys that evaluations use (Evaluation::counts), with their values as in to_toml(). They are keys of the
+/// worlds, and keys of the policy if has_policy.
 std::map<std::string, std::string> keys_of_evaluation(const Config& config, bool has_policy);
 
 }  // namespace pictura

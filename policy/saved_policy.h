@@ -24,8 +24,8 @@ void write_policy(const std::string& path, const SavedPolicy& policy, WeightType
 void restore_tensors(const std::string& path, const std::vector<NamedTensor>& saved,
                      const std::vector<NamedTensor>& parameters);
 
-/// Copies the saved parameters into a policy. Throws Error as restore_tensors() does, and if policy.backbone is a
-/// different program.
+/// Copies the saved parameters into a policy. Throws Error as restore_tensors() does. Also throws Error if the two
+/// policies have different backbones.
 void restore_policy(const SavedPolicy& saved, const Policy& policy);
 
 /// Writes tensors as a safetensors file, in F32 or I64. Its metadata contain one entry: config.

@@ -43,7 +43,7 @@ class LiveView final : public StepObserver {
 
   /// Executes the pages' requests, then waits for at most 50 ms until the next step is due. Returns whether it is due.
   bool is_due() override;
-  /// Replaces the command of the agent that a viewer drives by keys. The commands are [slots].
+  /// If a viewer drives an agent, sets this agent's command from the pressed keys. The commands are [slots].
   void override_commands(Span<Command> commands_inout) override;
   void before_step(Span<const Command> commands) override;
   void after_step(const StepResult& result) override;

@@ -22,8 +22,8 @@ struct InsertedBox {
   float speed_mps = 0;  // signed, along the heading; observed as an auxiliary feature
 };
 
-/// Queries, the lists to which they refer, and the output. The output has one row per query, in the arrays that the
-/// simulator observes.
+/// Queries, the lists to which they refer, and the output. Each array of `out` has one row per query; arrays that the
+/// simulator does not fill are empty.
 struct ObservationQueries {
   Span<const ObservationQuery> queries;
   Span<const int32_t> hidden;

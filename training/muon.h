@@ -14,7 +14,7 @@ namespace pictura {
 /// queries, layers that read positions or pixels, and the two heads.
 bool is_stepped_by_muon(const NamedTensor& parameter);
 
-/// Root mean squares of the weights of hidden layers (is_stepped_by_muon()), even if AdamW updates them. all: over all
+/// Root mean squares of the weights for which is_stepped_by_muon() is true, also in runs without Muon. all: over all
 /// these weights. largest: maximum over matrices. Both are 0 without such layers.
 struct WeightRms {
   double all = 0, largest = 0;

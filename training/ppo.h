@@ -14,7 +14,8 @@ namespace pictura {
 
 /// State of the advantage filter (rules/advantage_filter.h) across rollouts.
 struct AdvantageFilter {
-  double average = -1;  // average over rollouts of the largest |advantage| or a quantile; negative at first
+  double average =
+      -1;  // average over rollouts of the largest |advantage|, or of a quantile of all |advantage|; negative at first
 };
 
 /// Upper bounds of the differences that rounding causes, before the first step, between a rollout's log-probabilities

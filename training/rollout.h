@@ -30,7 +30,8 @@ class RolloutObservations {
   void record(int64_t step, const at::Tensor& slots);
 
   /// Gathers the observations of rows. rows: i64 [batch] of step * slots + slot; the agents must have been active at
-  /// these steps. If images are drawn again, draw_images() draws them with this patch_px.
+  /// these steps. patch_px: side of the patches of images that are drawn again, as in draw_images()
+  /// (policy/observation.h).
   Observation gather(const at::Tensor& rows, int patch_px = 0) const;
 
   /// Whether images are kept when they are drawn.
@@ -58,7 +59,7 @@ class RolloutObservations {
   bool are_complete_ = false;
   int decision_steps_ = 1;
   std::unique_ptr<KeptImages> kept_images_;
-  std::unique_ptr<SceneHistory> scenes_;  // source of images that are drawn again; else null
+  std::unique_ptr<SceneHistory> scenes_;  // scenes of images that are drawn again; null if none are
 };
 
 struct Rollout {

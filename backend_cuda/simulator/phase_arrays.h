@@ -18,7 +18,7 @@ struct WorldScratch {
   int32_t* chosen_try = nullptr;   // [boxes] chosen try; -1: none
   int32_t* next_try = nullptr;     // [boxes] choice in the current round; -1: none
   BoxChains standing;              // boxes that have a place
-  // Writable box_cells of a crowd; null: the world has one cell.
+  // Arrays of a crowd's box_cells, for writing (see is_crowd()); null if the world is no crowd.
   int32_t *cell_begin = nullptr, *cell_items = nullptr;
 };
 

@@ -78,7 +78,7 @@ struct PedestrianRow : ResponseMeans {
 std::vector<PedestrianRow> summarize(const PedestrianResults& results);
 
 /// Writes a CSV file with a header and a row for each point. The columns are the path and its state, the pedestrian's
-/// point, and for each policy value, d_value, p_brake and d_p_brake. Throws Error naming the path.
+/// point, and four columns for each policy: value, d_value, p_brake and d_p_brake. Throws Error naming the path.
 void write_pedestrian_cases(const std::string& path, const PedestrianResults& results);
 
 /// Returns results and rows as the text of one JSON object. `cases_file` is the path of the file of cases; it may be

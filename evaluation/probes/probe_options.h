@@ -44,8 +44,8 @@ void visit_options(ProbeOptions& probe, Visitor&& v) {
           probe.batch);
 }
 
-/// Number of cases in every pass through a network. The input of a case with its road user and the input without the
-/// user have the same row in two passes, so that equal inputs give bit-identical outputs.
+/// Number of cases in every pass through a network. A case has two inputs: with and without its road user. They take
+/// the same row of two passes, so that equal inputs give bit-identical outputs.
 constexpr int probe_pass(Device device) { return device.is_host() ? 256 : 2048; }
 
 /// Returns the default number of scenes: each policy drives equally many on each map, and each map has two scenes or

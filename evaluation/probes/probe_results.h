@@ -53,8 +53,8 @@ struct ProbeResults {
   const PairedResponse& response(size_t one, size_t policy) const { return responses[one * policies.size() + policy]; }
 };
 
-/// Mean responses of one policy to cases of one kind. An estimate first takes the mean over the cases of each scene,
-/// and then the mean over scenes, with its 95 % interval; both are infinite without scenes.
+/// Mean responses of one policy to cases of one kind. An estimate is the mean over scenes of each scene's mean over its
+/// cases, with a 95 % interval. Without scenes, mean and interval are infinite.
 struct ResponseMeans {
   int64_t cases = 0;
   int scenes = 0;  // number of scenes with cases of this kind

@@ -69,8 +69,8 @@ struct RemovalRow : ResponseMeans {
 /// of these sets has one row per bin of occlusion, and a last row for users outside all frames.
 std::vector<RemovalRow> summarize(const RemovalResults& results);
 
-/// Writes a CSV file with a header and a row for each case. The columns are the case's data, and for each policy value,
-/// d_value, p_brake and d_p_brake. Throws Error naming the path.
+/// Writes a CSV file with a header and a row for each case. The columns are the case's data, then value, d_value,
+/// p_brake and d_p_brake of each policy. Throws Error naming the path.
 void write_removal_cases(const std::string& path, const RemovalResults& results);
 
 /// Returns results and rows as the text of one JSON object. `cases_file` is the path of the file of cases; it may be
