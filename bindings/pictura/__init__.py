@@ -19,6 +19,14 @@ if "OMP_WAIT_POLICY" not in os.environ:
 # Submodules are looked for there first.
 __path__.insert(0, str(folder_of_extensions(pathlib.Path(__file__).parent, pathlib.Path("/proc/cpuinfo").read_text())))
 
+try:
+    from pictura import _pictura  # noqa: F401
+except ImportError as error:
+    # Drawing needs X's client libraries, which wheels must not include.
+    if not str(error).startswith("libX"):
+        raise
+    raise ImportError(f"{error}: install X's client libraries, on Debian and Ubuntu by apt install libxext6 libxrender1") from None
+
 from pictura._pictura import (  # noqa: E402, F401
     AGENT_FIELDS,
     BOX_DTYPE,

@@ -64,3 +64,17 @@ def test_both_builds_give_the_same_bits():
         assert out.returncode == 0, out.stderr
         found.add(out.stdout)
     assert len(found) == 1
+
+
+def test_a_missing_library_of_x_is_named_with_its_remedy():
+    code = """
+import sys
+class Finder:
+    def find_spec(self, name, path, target=None):
+        if name == "pictura._pictura":
+            raise ImportError("libXrender.so.1: cannot open shared object file: No such file or directory")
+sys.meta_path.insert(0, Finder())
+import pictura
+"""
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert out.returncode == 1 and "libXrender.so.1" in out.stderr and "apt install libxext6 libxrender1" in out.stderr
