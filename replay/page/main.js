@@ -96,7 +96,7 @@ function show(replay, live) {
       if (isDriving) { actions.follow(true); actions.play(true); }
       dirty();
     },
-    follow(follow) { state.follow = follow; if (follow && state.zoom < 2) state.zoom = 5; dirty(); },
+    follow(follow) { state.follow = follow; if (follow) state.zoom = Math.max(state.zoom, 5); dirty(); },
     fail,
   };
   fillLegend();

@@ -193,6 +193,7 @@ class Chromium(PageCase):
         self.assertEqual(self.state()["agent"], (first[1] + 1) % 24)
         self.browser.key("f")
         self.assertTrue(self.state()["follow"])
+        self.assertGreaterEqual(self.state()["zoom"], 5)
         self.browser.key("/")
         for letter in "17":
             self.browser.key(letter)
