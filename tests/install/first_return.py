@@ -68,8 +68,8 @@ def main() -> None:
         parts["training"] = time.monotonic() - start - sum(parts.values())
         with (folder / "ppo/progress.csv").open() as file:
             returns = [float(row["charts/episode_return"]) for row in csv.DictReader(file)]
-    total = time.monotonic() - start
 
+    total = sum(parts.values())  # without the removal of the environment
     seconds = ", ".join(f"{part} {value:.0f}" for part, value in parts.items())
     print(f"return {returns[0]:.2f} in the first update, {returns[-1]:.2f} in the last, minimum {min(returns):.2f}")
     print(f"{total:.0f} s: {seconds}")
