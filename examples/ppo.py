@@ -3,9 +3,9 @@
 Minutes on a CPU:    python examples/ppo.py
 A GPU, with images:  python examples/ppo.py --device cuda --observation images --num-envs 2720 --total-timesteps 50000000
 
-It prints the mean return of agents whose episode ended in the last ten updates, and goals, waypoints and
-infractions for 1,000 agent-steps, and writes
-progress.csv, config.toml and policy.pt into --out: `pictura plot runs/ppo_1 runs/ppo_2` draws their curves.
+It prints the mean return of agents whose episode ended in the last ten updates, goals, waypoints and infractions
+for 1,000 agent-steps, and km per infraction. It writes progress.csv, config.toml and policy.pt into --out:
+`pictura plot runs/ppo_1 runs/ppo_2` draws their curves.
 
 Observations, rewards and actions stay in the simulator's memory: the tensors here are views of it, and only a rollout's
 storage is copied. Steps of halted agents are stored, since arrays are rectangular, and masked out of every loss.
@@ -182,6 +182,7 @@ def main() -> None:
             "goals": driven["driving/goals_per_1000_steps"],
             "waypoints": driven["driving/waypoints_per_1000_steps"],
             "infractions": infractions,
+            "km_per_infraction": 0.1 * driven["driving/mean_speed_mps"] / infractions if infractions else None,
             "value_loss": value_loss.item(),
             "entropy": entropy.item(),
         }
@@ -195,7 +196,8 @@ def main() -> None:
         if update == 1:  # the first update compiles kernels
             start, before = time.time(), agent_steps
         if not args.json and (update == 1 or update % 5 == 0 or update == num_updates):
-            print(" ".join(f"{key} {value:.4g}" for key, value in summary.items()), flush=True)
+            shown = {key: "-" if value is None else f"{value:.4g}" for key, value in summary.items()}
+            print(" ".join(f"{key} {text}" for key, text in shown.items()), flush=True)
     if folder:
         saved = {"policy": agent.config, "num_cameras": agent.num_cameras, "weights": agent.state_dict()}
         torch.save(saved, folder / "policy.pt")  # policy = Policy(saved["policy"], saved["num_cameras"]); load_state_dict(...)

@@ -60,7 +60,7 @@ def test_ppo_learns_the_demo_in_a_minute(tmp_path):
     pytest.importorskip("gymnasium")
     options = ["--total-timesteps", "31000", "--out", str(tmp_path / "ppo")]
     out = run("ppo.py", *options, env=os.environ | {"OMP_NUM_THREADS": "2"})
-    for word in ("return", "goals", "waypoints", "infractions"):
+    for word in ("return", "goals", "waypoints", "infractions", "km_per_infraction"):
         assert f" {word} " in out
     with (tmp_path / "ppo/progress.csv").open() as file:
         returns = [float(row["charts/episode_return"]) for row in csv.DictReader(file)]
