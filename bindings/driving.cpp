@@ -174,7 +174,7 @@ struct ProbeArguments {
 template <typename Probe, typename Visitor>
 void visit_options(ProbeArguments<Probe>& arguments, Visitor&& v) {
   EvaluateOptions& worlds = arguments.probe.worlds;
-  v.value({"policies"}, arguments.probe.policies);
+  v.policies({"policies"}, arguments.probe);
   v.maps({"maps"}, worlds.maps);
   v.value({"agents_per_world"}, worlds.agents_per_world);
   v.value({"steps"}, worlds.steps);
@@ -198,14 +198,17 @@ void visit_options(PolicyArguments& arguments, Visitor&& v) {
   visit_light_options(arguments, v);
 }
 
-/// Throws UsageError if `replay` has a case or cameras but no file, if the file is invalid, or if the case is not less
-/// than `count`.
-void check_case_replay(const CaseReplayOptions& replay, int64_t count) {
+/// Throws UsageError if `replay` names no page, if the requested case is not below `count`, or if a policy is a
+/// function, since replays open saved policies.
+void check_case_replay(const CaseReplayOptions& replay, const ProbeOptions& probe, int64_t count) {
   const std::string& path = replay.path;
   if (path.empty() && (replay.number || replay.recording.cameras)) {
     fail_usage("replay: expected a file *.html for a case or cameras, got none");
   }
   if (!path.empty() && !path.ends_with(".html")) fail_usage("replay: expected a file *.html, got '{}'", path);
+  for (size_t i = 0; i < probe.policies.size() && !path.empty(); ++i) {
+    if (probe.make_own_policies[i]) fail_usage("replay: expected saved policies, got {}", probe.policies[i]);
+  }
   if (replay.number && *replay.number < 0) fail_usage("case: expected 0 or more, got {}", *replay.number);
   check_case_number(replay, count);
 }
@@ -219,7 +222,8 @@ void def_probe(py::module_* module, const char* name, Results (*ask)(const Probe
                std::type_identity_t<int64_t Probe::*> most, const char* doc) {
   const auto probe = [=](const ProbeArguments<Probe>& arguments) -> py::object {
     const std::string& cases_file = arguments.cases_file;
-    check_case_replay(arguments.replay, most ? arguments.probe.*most : std::numeric_limits<int64_t>::max());
+    check_case_replay(arguments.replay, arguments.probe,
+                      most ? arguments.probe.*most : std::numeric_limits<int64_t>::max());
     const Results results = run_interruptible(name, arguments.probe.worlds.num_threads, {}, [&] {
       Results found = ask(arguments.probe);
       if (!cases_file.empty()) write_cases(cases_file, found);
@@ -413,10 +417,9 @@ void bind_evaluation(py::module_& module) {
 
 checkpoint: a policy's; '' with a controller in the paper's world. maps: names, files or ranges such as procedural:1-64.
 controller: 'lane', 'idm_lanes', 'random' or 'idle', which drives instead, or a function(observations) of NumPy arrays [slots,
-...] by name, like pictura.Simulator.observations, that returns actions int [slots], on the CPU. A function gets images, too, if cameras are
-named (rig, or width_px and height_px): `rgb` uint8 [slots, cameras, 3, height, width], black for inactive agents; rgb_0, rgb_1, ...
-if cameras have several sizes. densities: 'light', 'medium'
-and 'dense', with 60, 120 and 150 agents per world, or with agents_per_world. device, simulator, renderer: 'auto' or names;
+...] by name, like pictura.Simulator.observations, that returns actions int [slots], or logits [slots, 12] and values [slots], on
+the CPU. A function gets images, too, if cameras are named (rig, or width_px and height_px): `rgb` uint8 [slots, cameras, 3, height,
+width], black for inactive agents; rgb_0, rgb_1, ... if cameras have several sizes. densities: 'light', 'medium' and 'dense', with 60, 120 and 150 agents per world, or with agents_per_world. device, simulator, renderer: 'auto' or names;
 renderer '': as in training. rig, or width_px and height_px: other cameras. backbone: path of the program of policy.backbone.
 conditioning: numbers by name. light_cycles: 'phases' or 'independent', light_heads: 'as_mapped' or 'visible'; '': as in
 training. average: uses the average of weights in the checkpoint. camera_severity: severity of randomized cameras, 0 to 2
@@ -508,7 +511,9 @@ void bind_probes(py::module_& module) {
       &module, "probe_removal", &probe_removal, &write_removal_cases, &removal_summary_json, &RemovalOptions::removals,
       R"(Measures how policies' value and braking change when one road user is removed, like `pictura probe removal`.
 
-policies: checkpoints or safetensors; the world is the first policy's. maps, density, agents_per_world, steps and the arguments
+policies: checkpoints, safetensors, or functions as in evaluate(), on the CPU; the world is the first policy's, a function's is the
+paper's. A function that returns actions brakes with probability 0 or 1 and has no values (None); replay and 'untrained' need
+saved policies. maps, density, agents_per_world, steps and the arguments
 after argmax: as in evaluate(). scenes: number of driven scenarios, an equal share by each policy; 0: equally many on each map
 for each policy, two per map or more. removals: total number. sample_steps: steps between states. range_m: maximum distance of a
 user. control: 'none', 'nobody', 'permuted' or 'untrained'. batch: cases in a call. cases_file: a CSV file for every case.

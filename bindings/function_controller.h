@@ -1,4 +1,5 @@
-// Controllers that call a Python function. Evaluations accept such a function instead of a controller's name.
+// Python function as a driver: as a controller, which evaluations accept in place of a controller's name, and as a
+// policy, which probes accept in place of a file.
 #pragma once
 
 #include <functional>
@@ -8,8 +9,8 @@
 #include <pybind11/pybind11.h>
 
 #include "pictura/common/renderer.h"
-#include "pictura/simulator/controllers/controller.h"
-#include "pictura/simulator/simulator.h"
+#include "pictura/evaluation/evaluated_driver.h"
+#include "pictura/policy/session.h"
 
 namespace pictura::python {
 
@@ -18,12 +19,18 @@ namespace py = pybind11;
 /// Returns "function NAME" for a function. For another callable object, NAME is the name of its class.
 std::string name_of_function(const py::function& function);
 
-/// Returns a function that makes controllers. These call function(observations), which must return actions, int
-/// [slots]; `observations` is a dict of NumPy arrays [slots, ...]. With a renderer, observations also contain images:
-/// `rgb`, u8 [slots, cameras, 3, height, width], black for inactive agents; `rgb_0`, `rgb_1`, ... if the cameras have
-/// several sizes. Simulator and renderer must work in host memory; otherwise the controllers throw Error. They throw
-/// UsageError if the function returns anything except actions, and pass on exceptions that the function raises.
-std::function<std::unique_ptr<Controller>(const Simulator&, Renderer*)> function_controllers(
+/// Makes controllers that call function(observations), NumPy's arrays [agents, ...] by name. The function returns
+/// actions int [agents], or logits [agents, kNumActions] and values [agents], from which argmax and seed of the options
+/// choose as for a saved policy. With a renderer, observations have images as well: `rgb` u8 [agents, cameras, 3,
+/// height, width], black for inactive agents; `rgb_0`, `rgb_1`, ... if the cameras have several sizes. The controllers
+/// throw Error if the simulator is not on the host, UsageError if the function returns anything else, and exceptions
+/// that the function raises.
+std::function<std::unique_ptr<Controller>(const DriverOptions&, const Simulator&, Renderer*)> function_controllers(
     const py::function& function);
+
+/// Makes sessions in which such a function is the policy, on the host and in the paper's world, with the cameras that
+/// the options define. An action without logits has probability 1, and its value is NaN. Throws UsageError if the
+/// options specify another device or held actions; the sessions throw as the controllers do.
+std::function<std::unique_ptr<PolicySession>(const DriverOptions&)> function_sessions(const py::function& function);
 
 }  // namespace pictura::python

@@ -92,6 +92,19 @@ class ParameterVisitor {
       }
     });
   }
+  /// Adds policies: files, or Python functions that respond.
+  template <typename Options>
+  void policies(const NamedOption& option, Options& options) {
+    using Given = std::vector<std::variant<std::string, py::function>>;
+    add<Given>(option, {}, [&options](const Given& given) {
+      for (const auto& one : given) {
+        const auto* const path = std::get_if<std::string>(&one);
+        options.policies.push_back(path ? *path : name_of_function(std::get<py::function>(one)));
+        options.make_own_policies.push_back(nullptr);
+        if (!path) options.make_own_policies.back() = function_sessions(std::get<py::function>(one));
+      }
+    });
+  }
   /// Adds a Python function, or None.
   template <typename... Arguments>
   void callback(const NamedOption& option, std::function<void(Arguments...)>& value) {

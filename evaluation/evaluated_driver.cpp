@@ -108,7 +108,7 @@ EvaluatedDriver controller_driver(const DriverOptions& options, int steps) {
   }
   driver.drive = [&options, renderer](Simulator& simulator) {
     if (renderer) upload_maps(simulator, renderer.get());
-    return Driving{options.make_own_controller(simulator, renderer.get()),
+    return Driving{options.make_own_controller(options, simulator, renderer.get()),
                    [&simulator] { return count_active(simulator); }};
   };
   return driver;

@@ -123,10 +123,16 @@ std::unique_ptr<Renderer> PolicySession::make_renderer() const {
   return reads_images() ? pictura::make_renderer(parts_->config.render.backend, renderer_config()) : nullptr;
 }
 
-SimulatorConfig PolicySession::training_world() const { return simulator_config(parts_->config, parts_->device); }
+SimulatorConfig PolicySession::training_world() const {
+  SimulatorConfig world = simulator_config(parts_->config, parts_->device);
+  world.vector_observations |= parts_->observes_vectors;
+  return world;
+}
 
 SimulatorConfig PolicySession::evaluation_world(int steps) const {
-  return evaluation_simulator_config(parts_->config, steps, parts_->device);
+  SimulatorConfig world = evaluation_simulator_config(parts_->config, steps, parts_->device);
+  world.vector_observations |= parts_->observes_vectors;
+  return world;
 }
 
 const Config& PolicySession::config() const { return parts_->config; }

@@ -2,6 +2,8 @@
 // the worlds' states. Includes no torch headers.
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -21,9 +23,11 @@ struct ProbeOptions {
   // select the scenes (scenarios 0: default_probe_scenes()). Each policy drives an equal number of scenes: the first
   // policy the first range, and so on. The policies are those of `policies`, not `checkpoint`.
   EvaluateOptions worlds;
-  std::vector<std::string> policies;  // checkpoints or safetensors
-  int sample_steps = 10;              // number of steps between sampled states
-  int batch = 4096;                   // cases per call, rounded up to whole passes; affects only memory and time
+  std::vector<std::string> policies;  // checkpoints or safetensors, or names of a program's own policies
+  // [policies] creates the session of a program's own policy; empty for a file. Fewer than policies: files follow.
+  std::vector<std::function<std::unique_ptr<PolicySession>(const DriverOptions&)>> make_own_policies;
+  int sample_steps = 10;  // interval between sampled states
+  int batch = 4096;       // cases per call, rounded up to whole passes; affects only memory and time
 };
 
 /// Visits the options of all probes except policies, worlds and devices.

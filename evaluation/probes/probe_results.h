@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <string>
 #include <vector>
@@ -11,15 +12,18 @@
 
 namespace pictura {
 
-/// Responses of a policy to a state with a road user, and to the same state without the user. A response consists of
-/// the value and the probability of braking.
+/// Response of a policy to a state with a road user, V(o) and P(brake | o), and to the state without the user, o'.
+/// Values are NaN if the policy has none.
 struct PairedResponse {
   float value = 0, value_without = 0;
   float brake = 0, brake_without = 0;
 
   double value_change() const { return double{value} - double{value_without}; }
   double brake_change() const { return double{brake} - double{brake_without}; }
-  bool is_unchanged() const { return value == value_without && brake == brake_without; }
+  bool is_unchanged() const {
+    const bool has_no_value = std::isnan(value) && std::isnan(value_without);
+    return (has_no_value || value == value_without) && brake == brake_without;
+  }
 };
 
 struct ProbedPolicy {

@@ -102,6 +102,12 @@ void check_probe(const ProbeOptions& options, size_t num_policies) {
   }
 }
 
+std::unique_ptr<PolicySession> open_policy(const ProbeOptions& options, size_t policy) {
+  const auto& own = options.make_own_policies;
+  if (policy < own.size() && own[policy]) return own[policy](options.worlds);
+  return std::make_unique<PolicySession>(options.policies[policy], options.worlds);
+}
+
 ProbeFrame::ProbeFrame(Simulator& simulator, int steps_done, int drives)
     : worlds(simulator.worlds()), step(steps_done), driver(drives) {
   const Device device = simulator.device();

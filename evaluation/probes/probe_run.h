@@ -181,6 +181,9 @@ class ProbeRun final : public EvaluationObserver {
 /// Throws UsageError if policies cannot drive equal numbers of scenes, or if there is nothing to sample.
 void check_probe(const ProbeOptions& options, size_t num_policies);
 
+/// Opens a policy of the options, by its index.
+std::unique_ptr<PolicySession> open_policy(const ProbeOptions& options, size_t policy);
+
 /// Opens options.policies, and calls `probe` with them.
 template <typename Results, typename Options>
 Results with_opened(Options options,
@@ -190,8 +193,8 @@ Results with_opened(Options options,
   check_probe(options, options.policies.size());
   std::vector<std::unique_ptr<PolicySession>> opened;
   std::vector<PolicySession*> sessions;
-  for (const std::string& path : options.policies) {
-    opened.push_back(std::make_unique<PolicySession>(path, worlds));
+  for (size_t policy = 0; policy < options.policies.size(); ++policy) {
+    opened.push_back(open_policy(options, policy));
     sessions.push_back(opened.back().get());
   }
   return probe(sessions, options);

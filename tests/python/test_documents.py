@@ -113,12 +113,13 @@ def test_how_to_pages_are_short(page):
 
 def test_a_metric_of_ones_own_is_counted(checkout):
     names: dict[str, object] = {}
-    needs = (None, None, None, "mcap")
+    needs = (None, None, None, None, "mcap")
     for block, module in zip(blocks_of("how-to/own_metric.md"), needs, strict=True):
         if module is None or importlib.util.find_spec(module) is not None:
             run([block], "docs/how-to/own_metric.md", names)
     assert names["hard_steps"].sum() > 0 and names["distance_m"].sum() > 1000
     assert (checkout / "drive.html").exists()
+    assert names["report"]["cases"] > 100 and names["report"]["rows"][0]["abs_d_p_brake"] > 0
 
 
 def test_a_reward_of_your_own_is_paid(capsys):

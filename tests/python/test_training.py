@@ -509,6 +509,104 @@ def test_functions_see_what_the_cameras_see():
         pictura.evaluate("", maps, controller=idle, camera_severity=1, **{**options, "width_px": 0, "height_px": 0})
 
 
+PROBED = {"scenes": 2, "steps": 30, "sample_steps": 2, "agents_per_world": 20, "num_threads": 1}
+
+
+@pytest.mark.parametrize("trained", ["vector"], indirect=True)
+def test_functions_are_probed_as_policies(trained, tmp_path):
+    _, folder, _, _ = trained
+    saved = str(folder / "checkpoint.ckpt")
+    network = pictura.torch.load_policy(saved)
+
+    def twin(observations):
+        with torch.no_grad():
+            return network(observations)
+
+    cases = tmp_path / "cases.csv"
+    report = pictura.probe_removal([saved, twin], ["procedural:1"], removals=60, cases_file=str(cases), device="cpu", **PROBED)
+    rows = list(csv.DictReader(cases.open(newline="")))
+    assert len(rows) == report["cases"] > 20 and [policy["policy_hash"] for policy in report["policy"]][1] == "function twin"
+    for what in ("value", "d_value", "p_brake", "d_p_brake"):
+        theirs, own = ([float(row[f"{name}/{what}"]) for row in rows] for name in (report["policy"][0]["name"], "function twin"))
+        np.testing.assert_allclose(own, theirs, atol=1e-4)
+        assert np.ptp(own) > 0
+
+
+def test_functions_drive_through_corners():
+    def brake(observations):
+        return np.full(len(observations["ego"]), 1)
+
+    def hurry(observations):
+        return np.full(len(observations["ego"]), 10)
+
+    options = {"scenes": 2, "steps": 300, "pairs": 1, "driver": "lane", "agents_per_world": 90, "seed": 3, "num_threads": 2}
+    report = pictura.probe_corner([brake, hurry], ["procedural:1"], **options)
+    assert report["pairs"] == 1
+    braking, hurrying = ([row["speed_curve_mps"] for row in report["rows"] if row.get("policy") == f"function {name}" and "speed_curve_mps" in row] for name in ("brake", "hurry"))
+    assert len(braking) == len(hurrying) == 6 and all(curve[0] == other[0] and curve[5] < curve[0] and other[5] > curve[5] for curve, other in zip(braking, hurrying))
+
+
+def test_functions_that_return_actions_have_no_values(tmp_path):
+    maps, cases = ["procedural:1"], tmp_path / "cases.csv"
+
+    def careful(observations):
+        return np.where(observations["set_counts"][:, 0] > 6, 0, 10)  # brakes among more than six partners
+
+    report = pictura.probe_removal([careful], maps, removals=60, range_m=20, cases_file=str(cases), **PROBED)
+    rows = list(csv.DictReader(cases.open(newline="")))
+    assert {row["function careful/value"] for row in rows} == {"nan"}
+    brakes = {float(row["function careful/d_p_brake"]) for row in rows}
+    assert brakes <= {0.0, 1.0} and all(row["abs_d_value"] is None and row["changed_share"] in (None, row["abs_d_p_brake"]) for row in report["rows"])
+
+    seen = []
+
+    def watching(observations):
+        seen.append(observations)
+        return np.full(len(observations["ego"]), pictura.IDLE_ACTION)
+
+    pictura.probe_removal([watching], maps, removals=8, width_px=32, height_px=18, **PROBED)
+    drives, responds = seen[0], seen[-1]
+    assert drives["rgb"].shape == (40, 4, 3, 18, 32) and responds["rgb"].shape[1:] == (4, 3, 18, 32) and drives["partners"].shape == (40, 16, 8)
+    assert all(image.std() > 5 for image in responds["rgb"].reshape(-1, 3, 18, 32)), "every camera sees something"
+
+    few = {"removals": 8, **PROBED}
+    floats = np.zeros((40, 12), np.float32)
+    for wrong, message in (
+        (lambda _: None, r"function <lambda>: expected actions, integers \[40\], got object"),
+        (lambda _: np.full(40, 12), r"expected actions in \[0, 12\), got 12 for slot 0"),
+        (lambda _: (floats,), r"expected logits, floats \[40, 12\], and values, floats \[40\], got \(float32 \(40, 12\)\)"),
+        (lambda _: (floats, floats), r"values, floats \[40\], got \(float32 \(40, 12\), float32 \(40, 12\)\)"),
+        (lambda _: (floats, floats[:, 0] + np.nan), "expected finite logits and values"),
+    ):
+        with pytest.raises(pictura.UsageError, match=message):
+            pictura.probe_removal([wrong], maps, **few)
+    with pytest.raises(ZeroDivisionError):
+        pictura.probe_removal([lambda _: 1 / 0], maps, **few)
+    for options, message in (
+        ({"control": "untrained"}, "function careful: expected a saved policy"),
+        ({"replay": "case.html"}, "replay: expected saved policies, got function careful"),
+        ({"device": "cuda"}, "device: expected auto or cpu for function careful, got cuda"),
+        ({"decision_steps": 2}, "decision_steps: expected trained policies, got function careful"),
+    ):
+        with pytest.raises(pictura.UsageError, match=message):
+            pictura.probe_removal([careful], maps, **options, **few)
+    with pytest.raises(TypeError, match="policies"):
+        pictura.probe_removal([3], maps, **few)
+
+
+def test_logits_choose_as_a_policys_do():
+    maps, options = ["procedural:1"], {"scenarios": 1, "steps": 40, "agents_per_world": 8, "device": "cpu"}
+    logits = np.tile(np.float32([0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 3, 2]), (8, 1))
+
+    def throttle(observations):
+        return logits, np.zeros(8)
+
+    rows = pictura.evaluate("", maps, controller=throttle, **options)["rows"]
+    assert repr(rows) == repr(pictura.evaluate("", maps, controller=lambda _: np.full(8, 10), **options)["rows"])
+    draws = [pictura.evaluate("", maps, controller=throttle, argmax=False, seed=seed, **options)["rows"] for seed in (1, 1, 2)]
+    assert repr(draws[0]) == repr(draws[1]) != repr(draws[2]) and repr(draws[0]) != repr(rows)
+
+
 def test_functions_enter_the_robust_protocol():
     def throttle(observations):
         return np.full(len(observations["ego"]), pictura.IDLE_ACTION)
