@@ -122,6 +122,27 @@ class Ranks(CommandCase):
                     self.folder / f"{run}-1/checkpoint.ckpt", self.folder / f"{run}-{size}/checkpoint.ckpt", start
                 )
 
+    def test_they_resume_exactly_in_sets_of_recorded_scenes(self):
+        scenes = self.folder / "scenes"
+        scenes.mkdir()
+        for number in (1, 2, 3):
+            self.json_of("simulate", f"procedural:{number}", "--policy", "lane", "--agents", "6", "--steps", "91",
+                         "--scene", scenes / f"{number}.scenario")  # fmt: skip
+        # Two worlds, which show other scenes at every update.
+        settings = [
+            *self.SETTINGS, "--set", f'simulator.maps=["scenes:{scenes}"]', "--set", "simulator.num_slots=12",
+            "--set", "simulator.max_agents=6", "--set", "simulator.scenes.updates_per_set=1", "--set", "policy.modality=vector",
+        ]  # fmt: skip
+        updates = lambda n: ["--set", f"train.updates={n}", "--set", "train.schedule=constant"]
+        whole = self.train(2, *settings, *updates(4), "--out", self.folder / "whole")
+        self.train(2, *settings, *updates(2), "--out", self.folder / "parts")
+        parts = self.train(2, *settings, *updates(4), "--out", self.folder / "parts", "--resume")
+        self.assertEqual((whole["updates"], parts["updates"], parts["ranks"]), (4, 4, 2))
+        self.assertEqual(parts["policy_hash"], whole["policy_hash"])
+        self.assertEqual(*(checkpoint_parts(self.folder / run / "checkpoint.ckpt") for run in ("parts", "whole")))
+        one_set = self.train(2, *settings, "--set", "simulator.scenes.updates_per_set=4", *updates(4), "--out", self.folder / "set")
+        self.assertNotEqual(one_set["policy_hash"], whole["policy_hash"])
+
     def long_run(self, out):
         """Starts two ranks that save a checkpoint and then run for long."""
         processes = self.start(
