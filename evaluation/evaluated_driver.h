@@ -25,9 +25,9 @@ struct DriverOptions : SessionOptions {
   // Controller that drives instead of the checkpoint's policy: a name known to make_controller(), for instance "lane".
   // The world's configuration is the checkpoint's; without a checkpoint it is the paper's.
   std::string controller;
-  // Creates the controller if a program supplies its own; `controller` is then its name. The controller drives on the
-  // host and reads vectors. If the options define cameras (rig, or width_px and height_px), the controller also reads
-  // their images, drawn by its renderer, which holds the simulator's maps. Without cameras the renderer is null.
+  // Creates a controller that the calling program supplies; `controller` is then its name. The controller runs on the
+  // host and reads vector observations. If the options define cameras (rig, or width_px and height_px), the last
+  // argument is a renderer for these cameras, which holds the simulator's maps. Without cameras it is null.
   std::function<std::unique_ptr<Controller>(const DriverOptions&, const Simulator&, Renderer*)> make_own_controller;
   bool argmax = true;
   uint64_t seed = 1;

@@ -23,10 +23,11 @@ struct ProbeOptions {
   // select the scenes (scenarios 0: default_probe_scenes()). Each policy drives an equal number of scenes: the first
   // policy the first range, and so on. The policies are those of `policies`, not `checkpoint`.
   EvaluateOptions worlds;
-  std::vector<std::string> policies;  // checkpoints or safetensors, or names of a program's own policies
-  // [policies] creates the session of a program's own policy; empty for a file. Fewer than policies: files follow.
+  std::vector<std::string> policies;  // files (checkpoints or safetensors), or names of policies of the calling program
+  // Element i creates the session of policies[i] if the calling program supplies this policy. It is empty for a file,
+  // and may be missing if only files follow.
   std::vector<std::function<std::unique_ptr<PolicySession>(const DriverOptions&)>> make_own_policies;
-  int sample_steps = 10;  // interval between sampled states
+  int sample_steps = 10;  // number of steps between sampled states
   int batch = 4096;       // cases per call, rounded up to whole passes; affects only memory and time
 };
 

@@ -12,8 +12,8 @@
 
 namespace pictura {
 
-/// Response of a policy to a state with a road user, V(o) and P(brake | o), and to the state without the user, o'.
-/// Values are NaN if the policy has none.
+/// Responses of a policy to a state with a road user, and to the same state without the user. A response consists of
+/// the value and the probability of braking. Values are NaN if the policy has none.
 struct PairedResponse {
   float value = 0, value_without = 0;
   float brake = 0, brake_without = 0;
