@@ -49,7 +49,7 @@ class LaneGraph {
   /// there is no route. Throws as route() does.
   std::vector<double> distances_from(LanePosition from) const;
 
-  /// Returns for each lane, as [lanes], whether a route leads to its start from the start of `lane`.
+  /// Returns, as [lanes], whether a route leads from the start of `lane` to the start of each lane.
   std::vector<bool> reachable_from(int32_t lane) const;
 
   /// Returns the strongly connected components (Tarjan, Depth-first search and linear graph algorithms, 1972).

@@ -28,8 +28,8 @@ MapCacheKey map_cache_key(std::string_view source_bytes, const OpenDriveOptions&
 std::string encode_map(const RoadMap& map, const MapCacheKey& key);
 
 /// Decodes and validates a map. Throws Error "NAME: reason" if the bytes are of another file type, byte order or
-/// version, truncated, stale (another importer, file or options), or damaged (wrong hash, size or value). Uses memory
-/// of at most a few times the size of the bytes, even if they are damaged.
+/// version, or are truncated, stale (another importer, file or options) or damaged (wrong hash, size or value). Uses
+/// memory of at most a few times the size of the bytes, even if they are damaged.
 RoadMap decode_map(std::string_view bytes, const MapCacheKey& key, const std::string& name);
 
 /// Returns the header that encode_map() puts before `payload`.

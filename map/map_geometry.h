@@ -26,7 +26,7 @@ std::string name_of(LightHeads heads);
 struct MapGeometryOptions {
   bool walls = true;                        // include walls along the building lines
   uint64_t wall_seed = 0;                   // selects the pieces of building lines that have walls
-  float light_half_angle_rad = kPi / 3.0f;  // half of the angle within which a head is visible (60 degrees)
+  float light_half_angle_rad = kPi / 3.0f;  // 60 degrees; half of the angle within which a head is visible
   LightHeads light_heads = LightHeads::as_mapped;
 };
 

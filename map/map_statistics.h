@@ -20,7 +20,7 @@ inline constexpr double kSteepGrade = 0.02;
 struct MapStatistics {
   // Quantiles at kMapQuantiles.
   std::array<double, 3> lane_width_m{}, speed_limit_mps{};
-  // Shares of the lanes outside junctions with 1, 2, 3, or at least 4 lanes side by side in their direction.
+  // Outside junctions: shares of lanes where 1, 2, 3, or at least 4 lanes are side by side in their direction.
   std::array<double, 4> lanes_shares{};
   // Shares of lanes by the radius of their curves. Class i contains radii up to kMapRadii_m[i]; the last class contains
   // larger radii.

@@ -134,7 +134,7 @@ std::vector<CurvePoint> sample_curve(const CurveBreaks& curve, double tolerance_
   for (std::size_t i = 1; i < breaks.size(); ++i) {
     const double begin = dense.back().s, span = breaks[i] - begin;
     if (span <= 0) continue;
-    // Uses even steps, several per piece, so that pieces can be nearly as long as allowed after thinning.
+    // Uses even steps, several per piece, so that, after thinning, pieces can be nearly as long as allowed.
     const int steps = static_cast<int>(std::ceil(kStepsPerPiece * span / max_piece_m - kPieceRounding));
     low = begin;
     high = breaks[i];

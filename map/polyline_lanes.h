@@ -50,12 +50,12 @@ LanePieces segments_of(const RoadMap& map, LanePredicate is_wanted);
 /// cross, are parallel, or differ there in height by kSameRoadLevel_m or more.
 std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
 
-/// Finds junctions. Wanted lanes of different roads that cross each other, except at their ends, become junction lanes.
-/// All junction lanes, including those marked before the call, are assigned to new junctions. Lanes that cross, fork or
-/// merge belong to one junction, which has the name of the first lane's road. A positive `bridged_m` is for roads that
-/// are cut into many lanes. Then junction lanes that follow each other also belong to one junction. A wanted lane
-/// between two junction lanes then becomes a junction lane if it is at most bridged_m long. `count_work` receives the
-/// number of steps of loops whose length the file determines.
+/// Finds junctions. Lanes of different roads become junction lanes if is_wanted accepts them and they cross anywhere
+/// except at their ends. All junction lanes, including those marked before the call, are assigned to new junctions.
+/// Lanes that cross, fork or merge belong to one junction, which has the name of the first lane's road. A positive
+/// `bridged_m` is for roads that are cut into many lanes. Then junction lanes that follow each other also belong to one
+/// junction. A wanted lane between two junction lanes then becomes a junction lane if it is at most bridged_m long.
+/// `count_work` receives the number of steps of loops whose length the file determines.
 void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
                              const std::function<void(std::size_t)>& count_work, RoadMap* map);
 

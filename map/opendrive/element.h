@@ -28,8 +28,8 @@ class Element {
   [[noreturn]] void fail(fmt::format_string<Args...> format, Args&&... args) const {
     where().fail_with(fmt::format(format, std::forward<Args>(args)...));
   }
-  /// Records a fault, which the caller then repairs by action_of(kind). If faults are strict, throws Error with the
-  /// message instead.
+  /// Records a fault, which the caller then repairs as action_of(kind) describes. If faults are strict, throws Error
+  /// with the message instead.
   template <typename... Args>
   void record_repair(RepairKind kind, fmt::format_string<Args...> format, Args&&... args) const {
     where().record_repair(faults_, kind, format, std::forward<Args>(args)...);

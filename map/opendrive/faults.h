@@ -15,8 +15,8 @@ class Faults {
  public:
   explicit Faults(bool strict) : strict_(strict) {}
 
-  /// Records a fault, which the caller then repairs by action_of(kind). In strict reading, throws Error with the
-  /// fault's message instead.
+  /// Records a fault, which the caller then repairs as action_of(kind) describes. In strict reading, throws Error with
+  /// the fault's message instead.
   void record_repair(Repair repair, const std::string& source) {
     if (strict_) throw Error(message_of(repair, source));
     // The limit bounds memory.

@@ -65,7 +65,7 @@ struct Street {
   bool parks_left = false, parks_right = false;
   bool slip_at_start = false, slip_at_end = false;  // right-turn lane for traffic that arrives at that end
   double leave = 0, arrive = 0;
-  double start_offset_m = 0, end_offset_m = 0;  // offsets of its ends to the right
+  double start_offset_m = 0, end_offset_m = 0;  // shift of each end to the right
   Curve curve;
   double length_m = 0;
 };
@@ -75,7 +75,7 @@ inline double lane_offset_m(const Street& street, int lane) {
   return (street.kind == StreetKind::motorway ? kHalfMedian_m : 0) + lane * street.lane_width_m;
 }
 
-/// Nodes of a motorway at an interchange, in the direction of its inner carriageway.
+/// Nodes of a motorway at an interchange, in the order in which the inner carriageway passes them.
 struct Interchange {
   int entry_fork = -1, overpass = -1, exit_fork = -1;
 };

@@ -18,7 +18,7 @@ constexpr double circle_edge_m(int lanes, int arm_lanes) {
 }
 
 /// Angle between an arm and the end of its entry on the circle, if the next arm on the side of the entry is `gap_rad`
-/// away. The same holds for the start of an exit. A piece of the circle remains between the two arms.
+/// away. The start of an exit is at the same angle. A piece of the circle remains between the two arms.
 inline double roundabout_half_angle(double gap_rad) {
   constexpr double kPiece_rad = 16 * std::numbers::pi / 180, kMax_rad = 36 * std::numbers::pi / 180;
   return std::min(0.5 * (gap_rad - kPiece_rad), kMax_rad);

@@ -127,10 +127,10 @@ struct LoggedScene {
   std::vector<LoggedStopSign> stop_signs;
   std::vector<LoggedLight> lights;
   bool has_links = true;  // if false, lanes are linked where their ends meet
-  /// Whether a program wrote the scene, so that it does not come from a recording. Then nothing is inferred. Types of
-  /// lanes, directions of links, sides and gaps of edges, and the grouping of lights are used as they are. Points are
-  /// rounded to the precision of a map. So the scenario does not change if scene_of_scenario() and make_scenario() are
-  /// applied to it.
+  /// Whether the scene is the work of a program, not a recording. In such a scene, nothing is inferred. Types of lanes,
+  /// directions of links, sides and gaps of edges, and the grouping of lights are used as they are. Points are rounded
+  /// to the precision of a map. So the scenario does not change if scene_of_scenario() and make_scenario() are applied
+  /// to it.
   bool is_authored = false;
   double tolerance_m = 0.02;                // maximum deviation of thinned polylines; 0: all points are kept
   std::optional<Eigen::Vector3d> origin_m;  // origin of the map; by default the centre of lanes and edges

@@ -21,7 +21,7 @@ FieldFileKind scene_file_kind();
 void write_scene_file(const std::string& path, const Scenario& scenario);
 
 /// Parses and validates the bytes of a file. `name` appears in messages. Throws Error "NAME: reason" if the bytes are
-/// of another file type, truncated, damaged, or written by a version whose scenes have other fields.
+/// of another file type, are truncated or damaged, or were written by a version whose scenes have other fields.
 Scenario parse_scene_file(std::string_view bytes, const std::string& name);
 
 }  // namespace pictura
