@@ -72,8 +72,8 @@ PICTURA_HD inline SampleRange whole_range() {
 /// Summand that moves a height, given as a fraction of kLines_rows, to the lowest bits of a float's mantissa.
 constexpr float kToLowestBits = 1 << 8;  // the sum's lowest mantissa bit is 1 / (kLines_rows * kRowUnits)
 /// For each column, the difference between an edge's height in that column and its height in the first column right of
-/// the pixel's centre. The differences also include -2^14, because the pixel's centre has height 2^14 in the lowest
-/// bits and must be at 0.
+/// the pixel's centre, minus 2^14. The subtraction moves the pixel's centre to height 0, because kToLowestBits puts it
+/// at 2^14.
 PICTURA_HD inline Int16x8 column_heights(const PolygonEdge& edge) {
   return arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
 }
@@ -122,8 +122,8 @@ PICTURA_HD inline float area_of(const PolygonEdge& edge, const EdgeCrossing& cro
   // width is to the left of the edge.
   const float left = max_no_nan(min_no_nan(crossing.left, to), from);
   const float right = max_no_nan(min_no_nan(crossing.right, to), from);
-  // Mean width of the area to the left of the edge, as a share of the pixel's width. It is the line's x midway between
-  // both heights.
+  // Mean width of the area to the left of the edge, as a share of the pixel's width. It equals the line's x midway
+  // between both heights.
   const float width = saturate(((left + right) - (crossing.left + crossing.right)) * edge.half_dx_dy + 0.5f);
   const float area = (right - left) * width + ((edge.dy_dx > 0.0f ? to : from) - right);
   return edge.rows_scale > 0.0f ? area : -area;

@@ -32,7 +32,7 @@ constexpr float kMaxOccluder_px = 4096.0f;
 /// occluder's plane.
 constexpr float kOccluderMargin_px = 0.05f, kOccluderDepthFactor = 1.002f;
 
-/// Area of the bounding box, within the image, of the face of a wall or box. Occluders are chosen by this area. Returns
+/// Area, within the image, of the bounding box of a wall's or a box's face. Occluders are chosen by this area. Returns
 /// 0 if the face cannot occlude; otherwise sets the face on screen and its winding.
 PICTURA_HD inline float occluder_area_px2(const PinholeCamera& camera, const CameraQuad& face, ScreenQuad* quad_out,
                                           bool* is_clockwise_out) {

@@ -336,7 +336,7 @@ struct OccludedSamples {
 
 /// For two fragments of different primitives, the samples of each that the other occludes. `shared` are the samples
 /// that both fragments cover; `a_first` are the shared samples at which a is in front. A sliver occludes nothing, and
-/// is occluded as a whole. A fragment that covers the whole pixel is occluded only by another fragment that does (see
+/// is occluded as a whole. A fragment that covers the whole pixel is occluded only by another such fragment (see
 /// PixelAccumulator).
 PICTURA_HD inline OccludedSamples occluded_samples(const PixelCoverage& a, const PixelCoverage& b, uint64_t shared,
                                                    uint64_t a_first) {

@@ -17,7 +17,7 @@ namespace pictura {
 /// Call at the beginning of main().
 void open_standard_streams();
 
-/// Print a result on stdout, or a message on stderr.
+/// These functions print a result on stdout, or a message on stderr.
 void print_result_text(const std::string& text);
 void print_message_text(const std::string& text);
 template <typename... T>
