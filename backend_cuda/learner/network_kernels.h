@@ -1,5 +1,5 @@
 // Kernels of network_passes.h, which documents their results. All launches are asynchronous on a stream; callers check
-// errors by cudaGetLastError().
+// cudaGetLastError().
 #pragma once
 
 #include <cuda_runtime_api.h>

@@ -143,9 +143,9 @@ __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t i
           light_ref(index)};
 }
 
-// Clips a lane's face of `count` corners in place, as clip_face does. This is possible because at most one corner past
-// the last read corner is written. Returns the number of corners, or kTooManyCorners if they do not fit or the face is
-// not exactly convex.
+// Clips a lane's face of `count` corners in place, as clip_face does. This is possible because the function writes at
+// most one corner beyond those that it has read. Returns the number of corners, or kTooManyCorners if they do not fit
+// or the face is not exactly convex.
 constexpr int kTooManyCorners = -1;
 __device__ inline int clip(const Frustum& f, unsigned crossed, int count, LaneCorners corners) {
   if (crossed == kOutside) return 0;

@@ -112,7 +112,7 @@ __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixe
   return passes_occluder_bound(memory.faces[farther], bound, x, y) ? farther : -1;
 }
 
-// A row of a face within a tile. It consists of four columns relative to the tile. Each is one byte, so that one
+// A row of a face within a tile, as four column numbers relative to the tile. Each number is one byte, so that one
 // shuffle passes all of them to another lane.
 static_assert(kTileWidth_px <= 255);
 struct TileSpan {
@@ -266,8 +266,8 @@ __device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wan
 
 // Makes all effective samples of a fragment visible initially. A fragment that covers its pixel fully may intersect the
 // pixel's full face, which then becomes a fragment too. Lists the pixels to be composited, whose fragments are not
-// alone (is_alone()). Records whether any pixel's remainder may have to be divided: several fragments cover the pixel
-// fully, and another one, not a sliver, covers it partly. Hardly any pixel has such fragments.
+// alone (is_alone()). Records whether any pixel's remainder may have to be divided, because several fragments cover the
+// pixel fully and another fragment, which is no sliver, covers it partly. Hardly any pixel has such fragments.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;

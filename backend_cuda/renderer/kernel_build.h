@@ -13,7 +13,7 @@ namespace pictura::cuda {
 struct KernelTarget {
   int compute_capability = 0;       // 10 * major + minor
   int num_cameras = 0;              // number of the rig's cameras; 0: any
-  int width_px = 0, height_px = 0;  // size of all cameras' images, if it is equal; 0: any
+  int width_px = 0, height_px = 0;  // common size of all cameras' images; 0: any
   bool randomizes_cameras = true;   // whether RendererConfig::randomization is on
 };
 

@@ -1,6 +1,6 @@
-// The rig's sizes as compile-time constants. Kernels built at run time are built for one rig (kernel_build.h defines
-// these macros); 0 means that the size is read from the task. Separate kernels exist for randomized cameras, so that
-// the other kernels have no instructions for them.
+// The rig's sizes as compile-time constants. Kernels built at run time are built for one rig, and get the macros below
+// from KernelTarget (kernel_build.h); 0 means that the size is read from the task. Separate kernels exist for
+// randomized cameras, so that the other kernels have no instructions for them.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/kernel_arguments.h"

@@ -1,4 +1,4 @@
-// Kernels of scene histories. Launches are asynchronous on a stream; callers check errors by cudaGetLastError().
+// Kernels of scene histories. Launches are asynchronous on a stream; callers check cudaGetLastError().
 #pragma once
 
 #include <cuda_runtime_api.h>

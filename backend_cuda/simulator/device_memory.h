@@ -109,7 +109,7 @@ struct DeviceState {
   }
 };
 
-/// Arrays that rules read from several maps, in one block of memory.
+/// The arrays of several maps, which the rules read, in one block of memory.
 class DeviceMaps {
  public:
   DeviceMaps() = default;

@@ -1,4 +1,4 @@
-// Kernels that the simulator's host side launches. All launches are asynchronous on a stream; callers check errors by
+// Kernels that the simulator's host side launches. All launches are asynchronous on a stream; callers check
 // cudaGetLastError().
 #pragma once
 
