@@ -37,7 +37,7 @@ class ImageArray {
   void begin();
   /// Averages the samples of the first `images` layers into the buffer.
   void resolve(int images);
-  /// Appends to copies_out the arguments of copy() for copying consecutive images to `out`. Each image has three
+  /// Appends to copies_out the copies that copy() must make to bring consecutive images to `out`. Each image has three
   /// planes, and there are `stride` values from one image to the next.
   void plan_copy(int first, int images, void* out, int64_t stride, std::vector<RowCopy>* copies_out) const;
   /// Copies images. Copies to the host are finished when the call returns; copies to a device are enqueued on the
