@@ -16,8 +16,8 @@ constexpr Rgb kRoadEdgeInk = hex(0xC8312F);
 constexpr Rgb kStopLineInk = hex(0xFFFFFF);
 constexpr Rgb kParkingSpaceInk = hex(0xC9D2DE);
 
-/// Bounding box of a map's lanes, road edges, markings and parking spaces. Nearly all other parts of a map are inside
-/// it. Throws Error when the map has none of these.
+/// Bounding box of a map's lanes, road edges, markings and parking spaces. Throws Error when the map has none of these.
+/// Nearly all other parts of a map are inside the box.
 Aabb2 bounds_of(const RoadMap& map);
 
 /// Colour of a lane's surface from above.
