@@ -48,15 +48,15 @@ struct SceneRealism {
   // Likelihoods in (0, 1]. pooled: the exponential of the mean log-likelihood over all road users and steps. by_object:
   // for each road user, the exponential of its mean log-likelihood over its steps; then the mean over road users.
   RealismLikelihoods pooled, by_object;
-  double score = 0, score_by_object = 0;  // means of pooled and by_object, weighted over features; without NaN
+  double score = 0, score_by_object = 0;  // weighted means of pooled and by_object over features without NaN
   double ade_m = 0, min_ade_m = 0;        // mean displacement of all road users: mean and minimum over rollouts
   // Shares of scored road users that have the event in rollouts, and in the recording.
   double collision_rate = 0, off_road_rate = 0, red_light_rate = 0;
   double recorded_collision_rate = 0, recorded_off_road_rate = 0, recorded_red_light_rate = 0;
   // short_time_to_collision: share of steps with a time to collision below kShortTimeToCollision_s. comfort: share of
   // vehicles within all bounds of comfort. Both cover the scored vehicles of all rollouts, or of the recording.
-  // progress: share of the vehicle's recorded path up to the point nearest to its final position, as a mean over
-  // vehicles.
+  // progress: mean over vehicles of the share of the recorded path up to the point nearest to the vehicle's final
+  // position.
   double short_time_to_collision = 0, recorded_short_time_to_collision = 0;
   double comfort = 0, recorded_comfort = 0;
   double progress = 0;

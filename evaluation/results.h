@@ -152,7 +152,7 @@ struct EvaluateRow {
   Estimate active_at_end_share, never_moved_share;
   Estimate collision_rate, wall_contact_rate;
   Estimate km_per_at_fault_infraction;  // km_driven per vehicle with at_fault_infraction; infinite if none has one
-  // Rates per km, for roads that end, which vehicles leave after a short distance.
+  // Rates per km, for roads that end: vehicles leave them after a short distance.
   Estimate at_fault_collisions_per_km, off_road_per_km, red_lights_per_km, goals_per_km;
   int64_t asked = 0, spawned = 0, entered = 0, left = 0;
   // From StandingCounts. reversing_share: fraction of driving time. red_wait_moved_m: mean per wait, NaN without waits.

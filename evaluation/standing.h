@@ -11,7 +11,7 @@
 namespace pictura {
 
 /// Computes the StandingCounts of worlds that are driven to the end. If the simulator runs on a GPU, the observer
-/// copies the data that it reads to the host at every step.
+/// copies its input data to the host at every step.
 class StandingObserver final : public StepObserver {
  public:
   /// Creates an observer; the simulator's worlds must be at the start of their episodes.

@@ -28,7 +28,7 @@ constexpr std::array<const char*, 2> kWallNames{"on", "off"};  // with walls, wi
 enum class CornerControl : uint8_t {
   none,      // the hidden vehicle
   permuted,  // a control: another vehicle near the ego, drawn at random for each pair; none if no other vehicle is near
-  untrained,  // a control: the hidden vehicle, with policies of fresh weights in the same states
+  untrained,  // a control: the hidden vehicle, for policies with fresh weights in the same states
 };
 constexpr std::array<const char*, 3> kCornerControlNames{"none", "permuted", "untrained"};
 

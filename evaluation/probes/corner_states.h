@@ -13,12 +13,12 @@ namespace pictura {
 
 struct ProbeFrame;
 
-/// Blind corner: a lane into a junction without traffic lights, and lanes of hidden traffic. Hidden traffic crosses the
-/// path of the first lane, and walls hide it from that lane (find_blind_crossings()). Junctions with lights are
-/// excluded, because a light stops one of the two streams of traffic.
+/// Blind corner: an approach lane into a junction without traffic lights, and lanes of hidden traffic. Hidden traffic
+/// crosses the approach lane's path, and walls hide it from that lane (find_blind_crossings()). Junctions with lights
+/// are excluded, because a light stops one of the two streams of traffic.
 struct BlindCorner {
   int32_t junction = -1;
-  Vec3 entry_m;  // end of the lane
+  Vec3 entry_m;  // end of the approach lane
   // Lanes of hidden traffic up to kCornerLead_m before the junction. Each lane is mapped to the place at which its
   // traffic enters the junction.
   std::map<int32_t, Vec3> lanes;

@@ -36,8 +36,8 @@ struct CrossingPath {
 /// and 120 degrees, each in both directions.
 std::vector<CrossingPath> paths_behind(const AgentBox& box, Vec2 eye_m);
 
-/// Returns for each point whether a pedestrian could stand there, [kPathPoints]: no drawn box and no wall on the path's
-/// level is at the point.
+/// Returns for each point, [kPathPoints], whether a pedestrian could stand there: no drawn box or wall on the path's
+/// level covers the point.
 std::vector<bool> free_points(const CrossingPath& path, Span<const AgentBox> boxes, Span<const WallFace> walls);
 
 /// Part of a path, in indices of points. The pedestrian is hidden in [begin, first_seen), seen in [first_seen,

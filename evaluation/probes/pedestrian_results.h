@@ -17,7 +17,7 @@ namespace pictura {
 enum class PedestrianControl : uint8_t {
   none,
   nobody,     // a control: no pedestrian is inserted, so no response may change
-  untrained,  // a control: the pedestrian is inserted, and policies of fresh weights respond in the same states
+  untrained,  // a control: the pedestrian is inserted, and policies with fresh weights respond in the same states
 };
 constexpr std::array<const char*, 3> kPedestrianControlNames{"none", "nobody", "untrained"};
 

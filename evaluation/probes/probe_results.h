@@ -13,7 +13,7 @@
 namespace pictura {
 
 /// Responses of a policy to a state with a road user, and to the same state without the user. A response consists of
-/// the value and the probability of braking. Values are NaN if the policy has none.
+/// the value and the probability of braking. The value is NaN if the policy has none.
 struct PairedResponse {
   float value = 0, value_without = 0;
   float brake = 0, brake_without = 0;

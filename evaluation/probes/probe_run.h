@@ -1,5 +1,5 @@
 // Procedure that all probes have in common: policies drive equal shares of the scenes, sampled states are collected in
-// one scene, and all policies evaluate batches of cases.
+// a KeptScene, and all policies evaluate batches of cases.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
-// Takeovers: from a state of a driven scene on, a policy drives an ego, while all other agents repeat their motion of
-// that scene. Includes no torch headers.
+// Takeovers: from a state of a driven scene, a policy drives an ego, while all other agents repeat their motion in that
+// scene. Includes no torch headers.
 #pragma once
 
 #include <array>
