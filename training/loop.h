@@ -18,7 +18,7 @@ struct UpdateCost {
   int64_t agent_steps = 0, slot_steps = 0;  // steps of active agents, and of all slots, in the rollout
   double kept_fraction = 0;                 // share of valid transitions that the filter keeps
   int64_t minibatches = 0;
-  double first_kl = 0;                 // KL divergence in the first minibatch before parameters change, from rounding
+  double first_kl = 0;                 // KL divergence due to rounding, in the first minibatch before parameters change
   double rollout_s = 0, update_s = 0;  // wall times of the rollout and of the update
   PhaseSeconds phases_s{};             // times of the phases of rollout and update
 };
@@ -30,7 +30,7 @@ struct TrainProgress {
   double agent_steps_per_s = 0;         // since the run began or was resumed
   double recent_agent_steps_per_s = 0;  // over the last minute
   double episode_return = 0;            // mean over agent episodes that ended in the last updates; NaN before the first
-  double eta_s = 0;  // time to the last update, the end of the schedule or of `minutes`, whichever comes first
+  double eta_s = 0;              // time until train.updates, the schedule or `minutes` ends, whichever comes first
   bool ends_by_minutes = false;  // whether the end of `minutes` comes first; eta_s is then an upper bound
   Scalars scalars;               // values logged for this update, as in progress.csv
   UpdateCost cost;               // cost of this update
@@ -53,7 +53,7 @@ struct TrainOptions {
   std::string commit;     // commit of this program, for the metadata of policy.safetensors
   Launch launch;          // place of this process among the processes that train together
   std::function<void(const TrainProgress&)> on_progress;  // called by rank 0 only, as is on_notice
-  std::function<void(const std::string&)> on_notice;      // receives messages for users that are not errors
+  std::function<void(const std::string&)> on_notice;      // receives messages that are not errors
 
   void notify(const std::string& notice) const {
     if (on_notice) on_notice(notice);
@@ -61,7 +61,7 @@ struct TrainOptions {
 };
 
 struct TrainReport {
-  // Work of all ranks: from here to km_driven.
+  // Members up to km_driven cover all ranks.
   int64_t agent_steps = 0, updates = 0;
   double agent_steps_per_s = 0, episode_return = 0, km_driven = 0;
   int ranks = 1;

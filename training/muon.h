@@ -23,8 +23,8 @@ struct WeightRms {
 WeightRms weight_rms(const std::vector<NamedTensor>& parameters);
 
 /// Returns matrices [n, rows, columns] with the singular vectors of `matrices` and singular values near 1. Computes
-/// them by five Newton-Schulz steps in `type`. Singular values of 1/200 of the Frobenius norm or more become .7 to 1.2.
-/// A zero matrix stays zero.
+/// them by five Newton-Schulz steps in `type`. Singular values of 1/200 of the Frobenius norm or more become 0.7 to
+/// 1.2. A zero matrix stays zero.
 at::Tensor orthogonalized(const at::Tensor& matrices, at::ScalarType type);
 
 class Muon {

@@ -15,12 +15,12 @@ namespace pictura {
 /// State of the advantage filter (rules/advantage_filter.h) across rollouts.
 struct AdvantageFilter {
   double average =
-      -1;  // average over rollouts of the largest |advantage|, or of a quantile of all |advantage|; negative at first
+      -1;  // average over rollouts of the largest |advantage|, or of a quantile of all |advantages|; negative at first
 };
 
-/// Upper bounds of the differences that rounding causes, before the first step, between a rollout's log-probabilities
-/// and the learner's. The first bounds the mean absolute difference, the second the share of ratios outside the clip
-/// range. Larger differences cause the log-probabilities to be recomputed.
+/// Upper bounds of rounding differences between a rollout's log-probabilities and the learner's, before the first step.
+/// The first bounds the mean absolute difference, the second the share of ratios outside the clip range. Larger
+/// differences cause the log-probabilities to be recomputed.
 constexpr double kMaxAbsLogRatio = 1e-3, kMaxClipFraction = 1e-3;
 
 /// Statistics of an update.

@@ -28,7 +28,7 @@ class RunKeeper {
   /// save(). Returns the recent updates for the mean return.
   std::vector<RecentUpdate> begin(Run* run);
 
-  /// Whether the configuration asks for a checkpoint after the run's last update.
+  /// Whether the configuration asks for a checkpoint after the run's latest update.
   bool is_due(const Run& run) const;
   /// Saves the run as checkpoint.ckpt and keeps older checkpoints. Does nothing if this update is already saved.
   void save(const Run& run, const std::vector<RecentUpdate>& recent);
