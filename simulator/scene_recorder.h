@@ -12,8 +12,8 @@
 
 namespace pictura {
 
-/// Records one episode of a world. Controlled agents, then parked cars become the tracks of a scene. Light states
-/// become its recorded lights. The simulator must work in host memory.
+/// Records one episode of a world. The controlled agents and then the parked cars become the tracks of a scene. Light
+/// states become its recorded lights. The simulator must work in host memory.
 class SceneRecorder final : public StepObserver {
  public:
   /// Records the simulator's current state as the first step. The simulator must outlive the recorder. Throws

@@ -33,7 +33,7 @@ constexpr int kMaxBoxes = 1 << 24;  // agents and parked cars of one simulator; 
 /// Configuration of a simulator. The defaults are those of the paper's training.
 struct SimulatorConfig {
   uint64_t seed = 0;
-  Device device;        // device of observations and scenes; the executor name `auto` selects by it
+  Device device;        // device of observations and scenes; `auto` selects an executor for this device
   int num_threads = 0;  // host threads; 0: all
   float dt_s = 0.1f;    // in [0.01, 0.1]
   int episode_steps = 1280;
@@ -215,9 +215,9 @@ class Simulator {
   /// for each array that the simulator observes; all others are empty. All spans must be in memory of device(). Throws
   /// Error, without writing, for arrays of other lengths, for more than 2^24 queries, and for invalid queries. A query
   /// is invalid if its slot or a range is out of bounds, if a hidden box is in another world, or if an inserted box has
-  /// numbers that are not finite. On a device, poll(), check() or the next call throws the errors of queries, and
-  /// partners, lanes, boundaries and walls must begin at a multiple of 16 bytes. There the call neither allocates nor
-  /// waits, and a CUDA graph can capture it.
+  /// numbers that are not finite. On a device, poll(), check() or the next call throws the errors of queries. There,
+  /// partners, lanes, boundaries and walls must begin at a multiple of 16 bytes; the call neither allocates nor waits,
+  /// and a CUDA graph can capture it.
   void observe(Span<const ObservationQuery> queries, Span<const int32_t> hidden, Span<const InsertedBox> inserted,
                const ObservationView& out, Stream stream = {});
 

@@ -13,7 +13,7 @@ namespace pictura {
 struct StepResult {
   Span<const float> reward;          // [slots]
   Span<const uint8_t> terminated;    // [slots] 1: an infraction ended the agent's episode in this step
-  Span<const uint8_t> truncated;     // [slots] 1: the episode, or a life, ended otherwise: bootstrap
+  Span<const uint8_t> truncated;     // [slots] 1: the episode or life ended in another way, so bootstrap
   Span<const uint8_t> valid;         // [slots] 1: learn from this step: the agent was active at the step's start, and
                                      // is neither impaired nor an opponent
   Span<const SpawnFailure> refusal;  // [slots] reason why the agent is absent from this episode, or `none`

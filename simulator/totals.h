@@ -35,7 +35,7 @@ constexpr float kRest_mps = 0.3f;  // agents up to this speed count as at rest
   SUM(finished_return)            /* sum of the returns of these agents */                      \
   COUNT(finished_passed_waypoint) /* of these agents, those that passed a waypoint */           \
   COUNT(finished_moved)           /* of these agents, those that moved faster than kRest_mps */ \
-  SUM(finished_first_motion_s)    /* sum over these: time from the start to the motion */
+  SUM(finished_first_motion_s)    /* over agents that moved: time from start to motion */
 
 /// Totals of controlled agents since the simulator's construction.
 struct SimulatorTotals {

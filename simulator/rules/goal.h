@@ -1,7 +1,7 @@
-// Goal chains: three waypoints on a random route along the lane network, which may change lanes. The waypoints are 20
-// to 60 m apart along the route. Also the test whether a waypoint is passed. On maps whose roads do not end, routes use
-// only lanes from which they can continue without end. On open maps, whose roads end, routes end shortly before the
-// lanes do.
+// Goal chains, and the test whether a waypoint is passed. A chain is three waypoints on a random route along the lane
+// network; routes may change lanes. The waypoints are 20 to 60 m apart along the route. On maps whose roads do not end,
+// routes use only lanes from which they can continue without end. On open maps, whose roads end, routes end shortly
+// before the lanes do.
 #pragma once
 
 #include "pictura/common/rng.h"

@@ -29,9 +29,9 @@ PICTURA_HD inline void observe_ego(const WorldView& world, int slot, float* out)
   out[8] = auxiliary && agents.lane[slot] >= 0 ? cos_of(agents.lane_angle_rad[slot]) : 0.0f;
 }
 
-/// Writes the observed conditioning. It is scaled by conditioning_scale, the paper's training ranges, and not by the
-/// ranges of the run, so that equal coefficients are observed equally in all runs. Coefficients that the paper does not
-/// vary are observed as 0. Values below the range, which pedestrians have, are clamped to -2.
+/// Writes the observed conditioning. It is scaled by the paper's training ranges (conditioning_scale), not by those of
+/// the run, so that equal coefficients are observed equally in all runs. Coefficients that the paper does not vary are
+/// observed as 0. Values below the range, which pedestrians have, are clamped to -2.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* out, const ThreadGroup& group = {}) {
   for (int i = group.rank(); i < kNumConditioning; i += group.size()) {
@@ -127,7 +127,7 @@ PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsPresen
   return nearest;
 }
 
-/// Returns the speed of a box that other agents observe: 0 for parked cars.
+/// Returns the observed speed of a box; 0 for parked cars.
 PICTURA_HD inline float observed_speed_mps(const WorldView& world, int box) {
   if (!world.options.auxiliary_observations) return 0.0f;
   if (box < world.num_agents) return world.agents.speed_mps[world.first_slot + box];
@@ -294,7 +294,7 @@ PICTURA_HD inline void prefetch_list_near(const MapView& map, const NearPlace& p
   for (int line = 0; line < kLines; ++line) prefetch(items, line * kLineBytes);
 }
 
-/// Argument of observe_set() in steps. Its rows overwrite those of the previous step.
+/// Argument of observe_set() for a step. Its rows overwrite those of the previous step.
 struct StepObservation {
   /// Returns the number of rows that may contain values other than zero. The count is clamped, because callers have
   /// access to the memory and may have changed it.

@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// Argument of observe_set() in queries. The destination may contain any previous values.
+/// Argument of observe_set() for a query. The destination may contain any previous values.
 class QueriedObservation {
  public:
   PICTURA_HD QueriedObservation(const ObservationQueries& asked, const ObservationQuery& query)

@@ -6,8 +6,8 @@
 
 namespace pictura {
 
-/// Values of the field goal_chains on maps with a record. An agent has one goal, the end of its record: it is
-/// kRecordedGoal until the agent passes the goal, then kRecordedGoalReached.
+/// Values of the field goal_chains on maps with a record: kRecordedGoal until the agent passes its only goal (the end
+/// of its record), then kRecordedGoalReached.
 constexpr int32_t kRecordedGoal = 1, kRecordedGoalReached = 2;
 
 /// Returns the recorded state of an agent `step` steps after its episode's start. After the record's end, it is the

@@ -19,7 +19,7 @@ class NearestOfOneThread {
   /// Adds the items whose squared distance from a point is less than below2, except item `except`.
   PICTURA_HD void offer_all(const Vec2* places, const int32_t* items, int num_items, int32_t except, Vec2 from,
                             float below2) {
-    // Near items are first collected in a buffer without branches, because it is hard to predict whether an item is
+    // Near items are first collected, without branches, in a buffer, because it is hard to predict whether an item is
     // near.
     float near_distance2[kGathered + 8];
     int32_t near_items[kGathered + 8];
