@@ -15,8 +15,8 @@
 namespace pictura {
 
 /// Images of the cameras that share one size. `pixels` are planar, u8 [batch, cameras of this size, 3, height, width],
-/// or patches (common/patches.h), bf16 [batch, cameras, rows, columns, values of a patch], whose memory has the order
-/// [cameras, batch, ...].
+/// or patches (common/patches.h), bf16 [batch, cameras, rows, columns, values of a patch]. The memory of patches has
+/// the order [cameras, batch, ...].
 struct ImageBlock {
   at::Tensor pixels;
   std::vector<int64_t> cameras;  // indices of these cameras in the rig
