@@ -41,7 +41,8 @@ constexpr int kReplayVersion = 2;
   X(action, 1, 0)
 
 /// Tracks. Positions are of the box's centre. Within an episode, headings do not jump by 360 degrees. `status` is an
-/// AgentStatus, and `events` are Event bits. `action` is 1 + action, or 0 if the agent did not choose an action itself.
+/// AgentStatus, and `events` are Event bits. `action` is 1 + the action's index, or 0 if the agent did not choose an
+/// action itself.
 enum class Track : int32_t {
 #define X(name, unit, order) name,
   PICTURA_REPLAY_STATE_TRACKS(X)
