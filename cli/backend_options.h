@@ -19,7 +19,7 @@ void add_backend_options(CLI::App* command, const std::string& otherwise, Sessio
 /// Adds the options of add_backend_options(), and --device for the policy's device.
 void add_policy_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out);
 
-/// Converts the options that were given to overrides of a training configuration.
+/// Returns overrides of a training configuration for the options that were given.
 std::vector<std::string> overrides_of(const SessionOptions& options);
 
 }  // namespace pictura

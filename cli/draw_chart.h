@@ -20,8 +20,8 @@ class NoMatplotlib : public Error {
 
 /// Runs plot.py on a request. The request contains a chart's name ("chart"), its arguments, and optionally the name of
 /// the picture ("out") and the text to print ("report"). The interpreter is $PICTURA_PYTHON if set, else the
-/// interpreter of the virtual environment with which this program was built, else python3. Throws Error with plot.py's
-/// message, NoMatplotlib, or Interrupted.
+/// interpreter of the virtual environment with which this program was built, else python3. Throws NoMatplotlib,
+/// Interrupted, or Error with plot.py's message.
 void draw_chart(const Json& request);
 
 /// Returns the colours of a list in plot.py, such as SERIES_COLORS, for pictures that accompany charts.
