@@ -16,7 +16,7 @@ struct ConfigKey {
 /// Returns every key, in the order of to_toml().
 std::vector<ConfigKey> config_keys();
 
-/// Returns a sentence for each setting of a configuration that has no effect but is not an error.
+/// Returns a sentence for each setting that has no effect but is not an error.
 std::vector<std::string> settings_without_effect(const Config& config);
 
 /// Returns the configuration with absolute paths of its files (rig, maps, other policies, teacher, backbone), so that

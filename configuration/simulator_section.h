@@ -24,7 +24,7 @@ struct SceneSection {
   std::string protocol = "gpudrive";
   std::string control;             // road users that the policy drives; empty: as in the protocol
   std::vector<std::string> rules;  // "NAME=VALUE": replace rules of the protocol, see set_scene_rule()
-  int max_replayed = 96;           // maximum number of road users in a world that follow the recording
+  int max_replayed = 96;           // maximum number, per world, of road users that follow the recording
   int64_t updates_per_set = 8;     // number of updates after which the worlds change to the next scenes
 
   /// Returns the protocol with these changes. Throws UsageError, which names the key (without its section), for an
