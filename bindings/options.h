@@ -176,7 +176,7 @@ struct OptionsFunction {
   void read(const py::args& by_place, const py::dict& by_name, const std::vector<Parameter>& parameters) const;
 };
 
-/// Defines a function of a module whose parameters are the options of Options.
+/// Defines a function in a module. The function's parameters are the options of Options.
 template <typename Options, typename Function>
 void def_with_options(py::module_* module, const OptionsFunction& arguments, const Function& function,
                       const std::string& doc) {
@@ -187,8 +187,7 @@ void def_with_options(py::module_* module, const OptionsFunction& arguments, con
   module->def(arguments.name.c_str(), arguments.caller<Options>(function), help.c_str());
 }
 
-/// Defines the constructor of a class whose parameters are the options of Options. arguments.name is the name of the
-/// class.
+/// Defines a class's constructor, whose parameters are the options of Options. arguments.name is the name of the class.
 template <typename Options, typename Class, typename Function>
 void def_init_with_options(Class* its_class, const OptionsFunction& arguments, const Function& make,
                            const std::string& doc) {
