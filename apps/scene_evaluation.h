@@ -26,7 +26,7 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments);
 /// if it was not.
 void reject_idle_scene_options(const CLI::App& command, const SceneArguments& arguments);
 
-/// Evaluates in recorded scenes, and prints a table, or one JSON object if `json`. `densities` are shares of driven
+/// Evaluates in recorded scenes, and prints a table, or one JSON object if `json`. `densities` are shares of remaining
 /// road users in %; without --density, they are those of the protocol. `options` contains the driver and the range of
 /// scenes. `out` is a file for later merging, or empty. After an interrupt, prints the completed results and throws
 /// Interrupted.
