@@ -52,10 +52,10 @@ std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
 
 /// Finds junctions. Lanes of different roads become junction lanes if is_wanted accepts them and they cross anywhere
 /// except at their ends. All junction lanes, including those marked before the call, are assigned to new junctions.
-/// Lanes that cross, fork or merge belong to one junction, which has the name of the first lane's road. A positive
-/// `bridged_m` is for roads that are cut into many lanes. Then junction lanes that follow each other also belong to one
-/// junction. A wanted lane between two junction lanes then becomes a junction lane if it is at most bridged_m long.
-/// `count_work` receives the number of steps of loops whose length the file determines.
+/// Lanes that cross, fork or merge belong to one junction, which has the name of the first lane's road. If bridged_m is
+/// positive (for roads that are cut into many lanes), a wanted lane of at most bridged_m between two junction lanes
+/// also becomes a junction lane, and junction lanes that follow each other belong to one junction. Calls
+/// count_work(steps) as it goes, so that the caller can limit the work that a file causes.
 void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
                              const std::function<void(std::size_t)>& count_work, RoadMap* map);
 

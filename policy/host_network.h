@@ -30,7 +30,7 @@ class HostNetwork {
  public:
   /// Reads the parameters of a policy with `num_cameras` cameras. Throws Error, which names the file and the parameter,
   /// if a parameter is missing, has another shape or is not finite. Throws Error, which names the program, if a
-  /// pretrained program replaces the policy's convolutions (policy.backbone).
+  /// pretrained TorchScript program replaces the policy's convolutions (policy.backbone).
   HostNetwork(const StoredPolicy& saved, int num_cameras);
   ~HostNetwork();
   HostNetwork(const HostNetwork&) = delete;

@@ -1,6 +1,6 @@
 // Small HTTP server for pages in browsers, mainly on this machine. Each connection carries one request. Ranges,
-// encodings and transfer codings are not supported. The cost of a connection is limited: the size of the request, the
-// times to read it and to write an answer, and the number of threads.
+// encodings and transfer codings are not supported. The size of a request, the times to read it and to write an answer,
+// and the number of threads are limited.
 #pragma once
 
 #include <chrono>

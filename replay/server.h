@@ -29,8 +29,8 @@ constexpr size_t kMaxWaitingMessages = 256, kMaxWaitingBytes = size_t{32} << 20;
 
 class LiveServer {
  public:
-  /// Starts listening, in separate threads. Throws UsageError for a host name that no browser sends, and Error if the
-  /// port is in use.
+  /// Starts listening, in separate threads. Throws UsageError if the host name has characters other than letters,
+  /// digits, dots and hyphens, and Error if the port is in use.
   explicit LiveServer(const LiveServerOptions& options);
   /// Closes all connections.
   ~LiveServer();

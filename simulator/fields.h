@@ -89,7 +89,7 @@ constexpr int kNumWaypoints = 3;
   X(halt_reason, uint8_t, 1, 0, "Event bits that halted it")                                                     \
   X(events, uint8_t, 1, 0, "Event bits of the last step")                                                        \
   X(goals_reached, int32_t, 1, 0, "last waypoints passed within 2 m in this episode")                            \
-  X(waypoints_reached, int32_t, 1, 0, "waypoints of any kind that paid or passed in this episode")               \
+  X(waypoints_reached, int32_t, 1, 0, "waypoints of any kind, passed or rewarded in this episode")               \
   X(distance_m, float, 1, 0, "sum of |speed| dt in this episode")                                                \
   X(first_motion_step, int32_t, 1, 0, "first step of this episode above kRest_mps, from 1; 0: none yet")         \
   X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                          \
@@ -98,9 +98,9 @@ constexpr int kNumWaypoints = 3;
 // Fields of lives. A life lasts from an agent's start or entry until it leaves the map. On maps with roads that end,
 // several lives follow each other in a slot. On other maps these fields keep their initial values, and saved states and
 // hashes omit them.
-#define PICTURA_LIFE_FIELDS(X)                                                                     \
-  X(life, int32_t, 1, 0, "lives of this episode that ended before by leaving")                     \
-  X(life_step, int32_t, 1, 0, "steps of this episode before the life began; counts are of a life") \
+#define PICTURA_LIFE_FIELDS(X)                                                \
+  X(life, int32_t, 1, 0, "number of earlier lives in this episode")           \
+  X(life_step, int32_t, 1, 0, "step of this episode at which the life began") \
   X(left, uint8_t, 1, 0, "1: it left in the last step")
 
 #define PICTURA_AGENT_FIELDS(X) PICTURA_EPISODE_FIELDS(X) PICTURA_LIFE_FIELDS(X)

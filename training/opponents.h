@@ -32,8 +32,8 @@ class Opponents {
   /// Returns a mask of the agents that the learner drives after the simulator's last step, u8 [slots].
   at::Tensor own_slots(const SimulatorArrays& input) const;
   /// Returns the commands of all agents, [slots]. The learner's agents take `own_actions`, [slots]; opponents' agents
-  /// take actions that the opponents draw. A later call overwrites the result. On a GPU, waits for the number of each
-  /// opponent's agents.
+  /// take actions that the opponents draw. A later call overwrites the result. On a GPU, waits until the host has read
+  /// the number of each opponent's agents.
   Span<const Command> commands(const SimulatorArrays& input, Span<const int32_t> own_actions, PolicyExecutor* executor);
 
  private:

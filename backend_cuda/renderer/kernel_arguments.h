@@ -105,8 +105,8 @@ PICTURA_HD constexpr Fault fault_of(FaultWord word) {
 /// Face count of an image that is not in the pool. It is so low that increments by other warps leave it negative.
 constexpr int32_t kNotPrepared = -(1 << 30);
 
-/// An image that is ready to be drawn: its faces in the pool, and the data that determine whether solids stand on
-/// strips. The struct is copied as words, so it has no padding.
+/// An image that is ready to be drawn: its faces in the pool, and the map and agents that stands_on() reads. The struct
+/// is copied as words, so it has no padding.
 struct PreparedImage {
   const DeviceGeometry* geometry = nullptr;
   const AgentBox* agents = nullptr;        // agents of its world

@@ -24,7 +24,7 @@ KernelSet ahead_of_time_kernels();
 /// not run on the device.
 cudaError_t prepare_kernels(KernelSet* kernels);
 
-/// Returns the bytes that a block of the last launch needs besides faces and edges.
+/// Returns the bytes that a block of the overflow launch (the last of launch_draw()) needs besides faces and edges.
 std::size_t large_block_bytes(const Scratch& large);
 
 /// Draws all images, in six launches.

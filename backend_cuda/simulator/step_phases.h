@@ -15,7 +15,7 @@ struct CheckCommands {
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int slot) const {
     const WorldView world = arrays.world(arrays.world_of_slot[slot]);
-    if (slot == world.first_slot) arrays.began[world.index] = 0;  // now in arrays.prepares
+    if (slot == world.first_slot) arrays.began[world.index] = 0;  // arrays.prepares has the value
     if (arrays.episode_over[world.index] || accepts(world, slot - world.first_slot, commands[slot])) return;
     atomics.lower(arrays.rejected_slot, slot);
   }
@@ -47,8 +47,7 @@ struct Advance {
   }
 };
 
-/// Phase that moves the box of a replayed track: box number index % parked_per_world of the boxes that belong to no
-/// agent.
+/// Phase that moves the box of a replayed track. `index` numbers the boxes that belong to no agent, over all worlds.
 struct ReplayTracks {
   PhaseArrays arrays;
   template <typename ThreadGroup>

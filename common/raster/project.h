@@ -37,7 +37,7 @@ struct alignas(16) ScreenFace {
   Rgb color;
   uint32_t color_bytes = 0;  // to_bytes(color), for CUDA code
 
-  /// Coverages of a pixel below this area are ignored, see min_area_of.
+  /// If the face covers less of a pixel than this area (px^2), the pixel ignores it; see min_area_of().
   PICTURA_HD float min_area() const { return static_cast<float>(min_area_units) * (1.0f / kAreaUnits); }
   PICTURA_HD void set_min_area(float area) { min_area_units = static_cast<uint16_t>(area * kAreaUnits + 0.5f); }
 

@@ -40,7 +40,8 @@ void visit_options(PedestrianOptions& options, Visitor&& v) {
 /// unchanged state. Each policy gets its input with and without the pedestrian: vectors from Simulator::observe, images
 /// from a scene with the pedestrian's box. Visibility is measured in the cameras of the first policy that reads images,
 /// or in the paper's cameras if no policy reads images. An interrupt ends the probe with the completed cases. Throws
-/// UsageError if policies cannot drive equal numbers of scenes. Throws Error naming file and key for bad input.
+/// UsageError if the number of scenes is not a multiple of the number of policies. Throws Error naming file and key for
+/// bad input.
 PedestrianResults probe_pedestrian(const PedestrianOptions& options);
 /// Probes policies that are already open on one device, with their renderers and cameras. options.policies holds their
 /// names.

@@ -59,8 +59,8 @@ struct KeptScene {
 
   /// Adds a world, followed by inserted boxes.
   void add_world(const ProbeFrame& frame, size_t world, Span<const InsertedBox> inserted = {});
-  /// Return a box's index in this scene. The box belongs to the last added world: for box_of() it is box `box_of_frame`
-  /// of the frame, for first_inserted() the first inserted box.
+  /// Return the index in this scene of a box of the last added world: for box_of(), of the frame's box `box_of_frame`;
+  /// for first_inserted(), of the first inserted box.
   int32_t box_of(const ProbeFrame& frame, size_t world, int32_t box_of_frame) const {
     return box_of_frame - frame.box_begin[world] + world_begin[geometry.size() - 1];
   }
@@ -104,8 +104,8 @@ struct ProbeKind {
 
 class ProbeRun final : public EvaluationObserver {
  public:
-  /// Creates a run of sessions that are open on one device; options.policies holds their names. Fills in the setting in
-  /// the results.
+  /// Creates a run of sessions that are open on one device; options.policies holds their names. Fills in the results
+  /// that follow from the options and the sessions.
   ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out,
            const ProbeKind& kind);
   ~ProbeRun() override;
@@ -115,8 +115,8 @@ class ProbeRun final : public EvaluationObserver {
 
   /// Drives all scenes: each policy drives its share, or options.worlds.controller drives all. Passes the worlds'
   /// states to `sample` after every sample_steps steps. Finally evaluates the remaining pairs, and returns the
-  /// visibility of every pair's measured_box, in the order of add_pairs(). If `watch` is given, states are only
-  /// observed, and add_pairs() must not be called.
+  /// visibility of every pair's measured_box, in the order of add_pairs(). If `watch` is given, only the driver's
+  /// worlds are simulated, and add_pairs() must not be called.
   std::vector<float> run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch = {});
 
   /// Adds pairs of the current frame. Their responses are appended to the results in the order of the pairs.
@@ -137,7 +137,7 @@ class ProbeRun final : public EvaluationObserver {
   Renderer& measuring() { return *measuring_; }
   Device device() const { return device_; }
   /// Return parts of a policy: the session that responds, the renderer of its images (null if it reads none), and the
-  /// configuration of worlds with its observations.
+  /// configuration of a simulator that makes the policy's observations.
   PolicySession& session(size_t policy) const;
   Renderer* renderer(size_t policy) const;
   SimulatorConfig world_of(size_t policy) const;

@@ -17,7 +17,7 @@ namespace pictura {
 /// Inputs that determine a scene. For one build of the importers, equal keys mean equal scenes.
 struct SceneCacheKey {
   static constexpr int64_t kIndex = -2;
-  // Hash of the scene's bytes; for an index, hash of the lengths and checksums of the records.
+  // Hash of the scene's bytes; for a list of records (kIndex), hash of their lengths and checksums.
   uint64_t content = 0;
   // Index of the record in the file; -1 if the file is the scene, kIndex for the list of the file's records.
   int64_t record = 0;

@@ -146,7 +146,7 @@ PICTURA_HD inline LanePose pose_of(const WorldView& world, int agent, RoutePoint
   return walks(world, agent) ? pose_on_walk(world.map, at.lane, at.s_m) : pose_on_lane(world.map, at.lane, at.s_m);
 }
 
-/// Returns the next waypoint of a pedestrian: a random gap ahead, then farther ahead until no parked car covers it.
+/// Returns the next waypoint of a pedestrian. It is a random distance ahead, or farther if a parked car is there.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD RoutePoint next_walk_waypoint(const WorldView& world, int agent, RoutePoint at, RandomStream* random_inout,
                                          const ThreadGroup& group = {}) {
