@@ -1,8 +1,9 @@
 """Driving policies that learn by self-play from what a car's cameras see: maps, simulators and renderers for Python.
 
-The package holds the library's objects; environments are in pictura.envs, policies as torch modules in pictura.torch.
-train needs torch. evaluate, the probes and PolicySession use torch if the package was built for the installed version,
-else they compute policies on the CPU without it. They are loaded on first use.
+The package holds the library's objects. Environments are in pictura.envs, and torch modules of policies in
+pictura.torch. The function train needs torch. The functions evaluate and probe_* and the class PolicySession use torch
+if the package was built for the installed version of torch; else they compute policies on the CPU without torch. The
+extension with these functions is loaded on its first use.
 """
 
 import os
@@ -11,12 +12,12 @@ from typing import TYPE_CHECKING
 
 from pictura._processor import folder_of_extensions
 
-# Waiting threads of torch's loops spin for milliseconds unless this variable limits it; see apps/limit_spinning.cpp for
-# the reason. The variable is read once, when the first of pictura and torch is imported.
+# GOMP_SPINCOUNT limits how long waiting OpenMP threads of torch spin; without it they spin for milliseconds (reason:
+# apps/limit_spinning.cpp). OpenMP reads the variable once, when torch or pictura is first imported.
 if "OMP_WAIT_POLICY" not in os.environ:
     os.environ.setdefault("GOMP_SPINCOUNT", "2000")
 
-# Submodules are looked for there first.
+# Python looks for submodules first in the folder of this processor's extensions.
 __path__.insert(0, str(folder_of_extensions(pathlib.Path(__file__).parent, pathlib.Path("/proc/cpuinfo").read_text())))
 
 try:
@@ -100,28 +101,28 @@ def __getattr__(name: str):
 
 
 def make_vec(maps=None, num_agents: int | None = None, *, preset: str | None = None, **options):
-    """Returns Gymnasium's vector environment of all agents: one slot an agent, of one or many worlds.
+    """Returns a Gymnasium vector environment of all agents of one or many worlds. Each agent has one slot.
 
     Observations are dicts of arrays [slots, ...], actions int [slots] in [0, 12), rewards float32 [slots].
-    docs/reference/environment.md describes all of them, and the infos.
+    docs/reference/environment.md describes observations, actions, rewards and infos.
 
     Args:
-        maps: Names or pictura.Map, one or several, taken in turn by the worlds: "procedural:3", "city:1", "Town01",
-            "mytown.xodr". None: those of the preset, else "procedural:3".
-        num_agents: Agents of each world. None: as the preset draws them, else 16.
-        preset: World, cameras, observation and reward of a configuration: "demo", a task that a CPU learns in minutes;
-            "town", the recipe of the released agents; "paper", the paper's training world. The last two need CARLA's
-            towns, or other maps.
-        options: Those of pictura.envs.gymnasium_vector.DriveVectorEnv (num_worlds, num_envs, autoreset, copy, ...), of
-            pictura.envs.Batch (observation, actions, device, rig, ...) and of pictura.Simulator (episode_steps,
-            conditioning, ...). They count instead of the preset's.
+        maps: One or several maps, as names or pictura.Map: "procedural:3", "city:1", "Town01", "mytown.xodr". World i
+            uses maps[i % len(maps)]. None: the maps of the preset, else "procedural:3".
+        num_agents: Number of agents in each world. None: the preset draws a number for each world; without a preset 16.
+        preset: Configuration that gives the world, cameras, observation and reward. "demo": a task that a policy learns
+            in minutes on a CPU; "town": the training world of the released policies; "paper": the paper's training
+            world. "town" and "paper" need CARLA's towns, or other maps in `maps`.
+        options: Arguments of pictura.envs.gymnasium_vector.DriveVectorEnv (num_worlds, num_envs, autoreset, copy, ...),
+            of pictura.envs.Batch (observation, actions, device, rig, ...) and of pictura.Simulator (episode_steps,
+            conditioning, ...). They override the preset.
 
     Returns:
-        pictura.envs.gymnasium_vector.DriveVectorEnv: It is at the start of no episode: call reset() first.
+        pictura.envs.gymnasium_vector.DriveVectorEnv: The environment. Call reset() before step().
 
     Raises:
-        pictura.UsageError: Names the option or the preset that there is not, and values that cannot be.
-        pictura.Error: Names file, line and element of a map that cannot be read; or there is no such device.
+        pictura.UsageError: An option or preset does not exist, or has an invalid value.
+        pictura.Error: A map cannot be read (the message names file, line and element), or the device does not exist.
 
     Examples:
         >>> envs = pictura.make_vec("procedural:3", num_agents=16, num_worlds=4)
@@ -130,7 +131,7 @@ def make_vec(maps=None, num_agents: int | None = None, *, preset: str | None = N
         >>> rewards.shape, observations["ego"].shape
         ((64,), (64, 9))
 
-        Images of small cameras on the task of `scripts/demo`:
+        Observations with images of small cameras, for the task of `scripts/demo`:
 
         >>> envs = pictura.make_vec(preset="demo", num_envs=8)
         >>> observations, infos = envs.reset(seed=1)
@@ -147,22 +148,22 @@ def make_vec(maps=None, num_agents: int | None = None, *, preset: str | None = N
 
 
 def make_vec_for(policy, maps="procedural:3", num_agents: int = 16, **options):
-    """Returns make_vec()'s environment with the world, cameras and observation that a policy was trained with.
+    """Returns an environment like make_vec(), with the world, cameras and observation of a policy's training.
 
-    A policy of decision_steps n expects its actions to be held for n steps.
+    If the policy was trained with decision_steps = n, the caller must repeat each action for n steps.
 
     Args:
-        policy: The name of a file, or what pictura.torch.load_policy() read.
+        policy: File name of a policy, or a policy loaded by pictura.torch.load_policy().
         maps: As in make_vec().
-        num_agents: Agents of each world.
-        options: As in make_vec(); they count instead of the policy's.
+        num_agents: Number of agents in each world.
+        options: As in make_vec(). They override the options of the policy's training.
 
     Returns:
-        pictura.envs.gymnasium_vector.DriveVectorEnv: At the start of no episode.
+        pictura.envs.gymnasium_vector.DriveVectorEnv: The environment. Call reset() before step().
 
     Raises:
-        pictura.UsageError: The policy is of no file, or there is no such option.
-        pictura.Error: Names the file that cannot be read.
+        pictura.UsageError: The policy was not loaded from a file, or an option does not exist.
+        pictura.Error: The file cannot be read.
 
     Examples:
         >>> envs = pictura.make_vec_for("models/perspective.safetensors", "procedural:3", num_agents=4)

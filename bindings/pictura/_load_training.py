@@ -1,5 +1,5 @@
-"""Chooses the extension that computes policies: one that was built with the minor version of the installed torch, else
-the one without torch, on the CPU. The choice does not import torch, which takes a second."""
+"""Chooses the extension that computes policies: the one built with the minor version of the installed torch, or the one
+without torch, which uses the CPU. The choice does not import torch, because the import takes a second."""
 
 import functools
 import importlib
@@ -30,7 +30,7 @@ def built_torches() -> list[str]:
 def torch_folder() -> pathlib.Path | None:
     """Returns the folder of the installed torch, or None."""
     spec = importlib.util.find_spec("torch")
-    # A folder of that name is not torch.
+    # A plain folder named torch has a spec without an origin.
     return pathlib.Path(spec.origin).parent if spec and spec.origin else None
 
 
@@ -51,7 +51,7 @@ def usable_torch() -> str | None:
 
 
 def why_no_torch() -> str:
-    """Returns why the package cannot use torch, and the remedy, if usable_torch() is None."""
+    """Returns the reason why usable_torch() is None, and the remedy."""
     built = built_torches()
     if not built:
         return (
@@ -68,19 +68,19 @@ def why_no_torch() -> str:
 
 @functools.cache
 def _extension():
-    """Returns the extension module. A process loads one, since all register the same types."""
+    """Returns the extension module. A process loads only one, because all of them register the same types."""
     if minor := usable_torch():
-        import torch  # noqa: F401  (with what its own __init__ loads)
+        import torch  # noqa: F401  (the import loads torch's libraries)
 
         return importlib.import_module(f"pictura._training_{minor.replace('.', '_')}")
     try:
         return importlib.import_module("pictura._driving")
-    except ModuleNotFoundError:  # built with torch alone
+    except ModuleNotFoundError:  # the package has only extensions with torch
         raise ImportError(why_no_torch()) from None
 
 
 def load(name: str):
-    """Returns `name` of the extension. Raises ImportError naming what is missing and the remedy."""
+    """Returns the object `name` of the extension. Raises ImportError, which names the missing part and the remedy."""
     if name == "train" and usable_torch() is None:
         raise ImportError(f"pictura.{name}: {why_no_torch()}")
     try:

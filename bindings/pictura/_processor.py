@@ -1,18 +1,20 @@
-"""Chooses the build of the extensions for this processor. Those of the package are for x86-64-v3 unless it was built
-for another processor. A wheel may hold extensions for any x86-64 processor in the folder x86_64 (scripts/wheels). Both give
-the same bits of simulators and images."""
+"""Chooses the build of the extensions for this processor.
+
+By default the package's extensions need x86-64-v3. A wheel may also hold extensions for all x86-64 processors, in the
+folder x86_64 (scripts/wheels). Simulations and images of both builds are equal bit for bit.
+"""
 
 import os
 import pathlib
 
 from pictura._built import PROCESSOR
 
-# Flags of x86-64-v3 in /proc/cpuinfo, beyond those of every x86-64 processor.
+# Flags in /proc/cpuinfo that x86-64-v3 adds to plain x86-64.
 _V3_FLAGS = {"abm", "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe", "xsave"}
 
 
 def is_v3(cpuinfo: str) -> bool:
-    """Returns whether the processor of a text in the form of /proc/cpuinfo has x86-64-v3."""
+    """Returns whether the processor that `cpuinfo` describes, in the format of /proc/cpuinfo, supports x86-64-v3."""
     flags = next((line.partition(":")[2].split() for line in cpuinfo.splitlines() if line.startswith("flags")), [])
     return set(flags) >= _V3_FLAGS
 
@@ -20,7 +22,8 @@ def is_v3(cpuinfo: str) -> bool:
 def folder_of_extensions(package: pathlib.Path, cpuinfo: str, built_for: str = PROCESSOR) -> pathlib.Path:
     """Returns the folder of the extensions and the command for this processor.
 
-    PICTURA_PROCESSOR chooses x86-64-v3 or x86-64. Raises ImportError if the package has no extensions for the processor.
+    The environment variable PICTURA_PROCESSOR, x86-64-v3 or x86-64, overrides the choice. Raises ImportError if the
+    package has no extensions for the processor.
     """
     wanted = os.environ.get("PICTURA_PROCESSOR", "")
     if wanted not in ("", "x86-64", "x86-64-v3"):

@@ -1,8 +1,8 @@
-"""Scenes from files of other libraries, through pictura.Scenario.from_arrays().
+"""Converts scenes of other libraries to pictura.Scenario, through pictura.Scenario.from_arrays().
 
-load_scenarionet() reads the pickles of ScenarioNet and MetaDrive (sd_*.pkl: Waymo, nuScenes, nuPlan, Argoverse 2).
-Nothing in a pickle is executed: it may hold only NumPy arrays and plain values. from_py123d() takes scenes of py123d,
-which it does not import.
+load_scenarionet() reads pickles of ScenarioNet and MetaDrive (sd_*.pkl: Waymo, nuScenes, nuPlan, Argoverse 2). It
+executes no code of a pickle, which may contain only NumPy arrays and plain values. from_py123d() converts scene objects
+of py123d, and does not import py123d.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ _NUMPY = re.compile(r"numpy\.(_?core\.(multiarray|numeric)\.)?(\w+)")
 def _plain_values(data: bytes) -> Any:
     """Returns the contents of a pickle of NumPy arrays and builtins; object arrays become lists.
 
-    Its callables are stand-ins that are created for every pickle, since a pickle can also change the objects that it
-    names.
+    Stand-ins replace the callables that the pickle names. They are created anew for every pickle, because a pickle can
+    modify the objects that it names.
     """
 
     class Type:
@@ -63,7 +63,7 @@ def _plain_values(data: bytes) -> Any:
         "numpy _reconstruct": lambda *_: Array(),
         "numpy _frombuffer": from_buffer,
         "numpy scalar": lambda type_, data: type_.array((), data, "C")[()],
-        # Encoding of bytes before protocol 3.
+        # Before protocol 3, pickles encode bytes with this function.
         "_codecs.encode": lambda text, _: text.encode("latin1"),
         "builtins.bytes": lambda: b"",
         "collections.defaultdict": lambda *_: {},
@@ -71,7 +71,7 @@ def _plain_values(data: bytes) -> Any:
         **{f"builtins.{kind.__name__}": kind for kind in (int, float, set)},
     }
 
-    # The Python implementation, half as fast as the C implementation, which allocates memory for as many memoized
+    # Python's unpickler is half as fast as the C unpickler. But the C unpickler allocates memory for as many memoized
     # values as a pickle declares.
     class Unpickler(pickle._Unpickler):
         def find_class(self, module: str, name: str) -> Any:
@@ -102,13 +102,13 @@ _LANE_TYPES = {
     "LANE_BIKE_LANE": "biking", "LANE_UNKNOWN": "other",
 }  # fmt: skip
 _LIGHTS = {"TRAFFIC_LIGHT_GREEN": "go", "TRAFFIC_LIGHT_RED": "stop", "TRAFFIC_LIGHT_YELLOW": "caution"}
-_OUTLINE = re.compile(r"boundary_\d+")  # names of drivable outlines in nuScenes' and nuPlan's converters
+_OUTLINE = re.compile(r"boundary_\d+")  # outlines of drivable areas in nuScenes and nuPlan
 _MAX_OUTLINE_WORK, _NEAR_M = 100_000_000, 50.0
 _MIN_HALF_WIDTH_M, _MAX_HALF_WIDTH_M = 0.5, 5.0  # as for borders in docs/reference/scenario.md
 
 
 class _Fault(Exception):
-    """Error in a part of a scene: its place, and the reason."""
+    """Error in a part of a scene. The message names the part and the reason."""
 
 
 def _entry(mapping: Any, key: str, place: str) -> Any:
@@ -120,7 +120,7 @@ def _entry(mapping: Any, key: str, place: str) -> Any:
 
 
 def _numbers(value: Any, place: str, shape: tuple[int | None, ...]) -> np.ndarray:
-    """Returns floats of that shape, in which None is any length; a last axis of one is dropped."""
+    """Returns floats of a shape, in which None matches any length. An additional last axis of length 1 is dropped."""
     try:
         array = np.asarray(value, float)
     except (TypeError, ValueError):
@@ -134,7 +134,7 @@ def _numbers(value: Any, place: str, shape: tuple[int | None, ...]) -> np.ndarra
 
 
 def _points(value: Any, place: str, is_flat: bool) -> np.ndarray:
-    """Returns points [n, 3], with or without a height; flat maps ignore heights."""
+    """Returns points [n, 3]. The height is 0 if points have no height, or if the map is flat."""
     points = _numbers(value, place, (None, None))
     if points.shape[1] not in (2, 3):
         raise _Fault(f"{place}: expected points of 2 or 3 numbers, got {points.shape[1]}")
@@ -143,7 +143,7 @@ def _points(value: Any, place: str, is_flat: bool) -> np.ndarray:
 
 
 def _numbered(keys: list[Any]) -> dict[str, int]:
-    """Returns integers for ids: the ids themselves if all are integers, else their positions."""
+    """Returns an integer for each id: the id itself if all ids are distinct integers, else its index."""
     texts = [str(key) for key in keys]
     own = all(re.fullmatch(r"\d{1,18}", text) for text in texts) and len({int(text) for text in texts}) == len(texts)
     return {text: int(text) if own else place for place, text in enumerate(texts)}
@@ -167,7 +167,8 @@ def _width_m(lane: dict, points: int, place: str) -> np.ndarray:
 
 
 def _width_of_halves(halves_m: np.ndarray) -> np.ndarray:
-    """Returns widths from plausible half widths [points, 2] on both sides; 0 throughout without plausible values."""
+    """Returns widths [points] from half widths [points, 2] of both sides. Implausible values are ignored; if none is
+    plausible, all widths are 0."""
     is_known = (halves_m >= _MIN_HALF_WIDTH_M) & (halves_m <= _MAX_HALF_WIDTH_M)
     sides = is_known.sum(1)
     if not sides.any():
@@ -177,7 +178,11 @@ def _width_of_halves(halves_m: np.ndarray) -> np.ndarray:
 
 
 def _neighbor(neighbors: Any, lanes: dict[str, int], nearest: int) -> int:
-    """Returns the lane with the longest common stretch, or the nearest of ids in left-to-right order; -1: none."""
+    """Returns the integer id of the neighbouring lane; -1: none.
+
+    Neighbours are dicts, of which the one with the longest common stretch counts, or ids from left to right, of which
+    `nearest` is the index.
+    """
     if not isinstance(neighbors, list) or not neighbors:
         return -1
     if not isinstance(neighbors[0], dict):
@@ -215,7 +220,7 @@ def _lanes_of(features: dict, is_flat: bool) -> tuple[dict[str, Any], dict[str, 
 
 
 def _is_inside(point: np.ndarray, ring: np.ndarray) -> bool:
-    """Whether a ray from the point crosses the ring an odd number of times."""
+    """Returns whether the point is inside the ring: a ray from it crosses the ring an odd number of times."""
     a, b = ring[:-1], ring[1:]
     spans = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
     a, b = a[spans], b[spans]
@@ -238,7 +243,7 @@ def _edges_of_outlines(rings: list[np.ndarray]) -> list[np.ndarray]:
 
 
 def _parts_near(lines: list[np.ndarray], places: np.ndarray) -> list[np.ndarray]:
-    """Returns the parts of lines near a box around the places, since outlines cover whole towns."""
+    """Returns the parts of lines near a bounding box of the places, because outlines cover whole towns."""
     low, high = places[:, :2].min(0) - _NEAR_M, places[:, :2].max(0) + _NEAR_M
     parts = []
     for line in lines:
@@ -338,8 +343,8 @@ def _scenarionet_arrays(scene: Any) -> dict[str, Any]:
     metadata = _entry(scene, "metadata", "scenario")
     time_s = _numbers(_entry(metadata, "ts", "metadata"), "metadata['ts']", (None,))
     steps = len(time_s)
-    # The third number of a lane's point is a heading in nuScenes' maps, and other maps are flat: only Waymo's frame has
-    # heights.
+    # Only maps in Waymo's frame have heights. In nuScenes' maps the third number of a lane's point is a heading, and
+    # the other maps are flat.
     is_flat = metadata.get("coordinate") != "waymo"
     tracks, places = _tracks_of(_entry(scene, "tracks", "scenario"), steps, is_flat)
     arrays, lanes = _map_of(_entry(scene, "map_features", "scenario"), is_flat)
@@ -359,8 +364,8 @@ def load_scenarionet(path: str | os.PathLike[str]) -> pictura.Scenario:
 
     The scene keeps road users, lanes with links, neighbours, widths and limits, lines, edges, crosswalks, stop signs
     and lights. It drops cones, barriers, sidewalks, driveways and speed bumps. Ids that are not integers are replaced
-    by positions. Maps are flat, except in Waymo's frame. Raises pictura.Error naming the file and the part, also if a
-    pickle names anything but NumPy arrays and builtins.
+    by indices. Maps are flat, except in Waymo's frame. Raises pictura.Error, which names the file and the part, also if
+    a pickle contains other objects than NumPy arrays and builtins.
 
     Examples:
         >>> from pictura.datasets import load_scenarionet # doctest: +SKIP
@@ -372,7 +377,7 @@ def load_scenarionet(path: str | os.PathLike[str]) -> pictura.Scenario:
         raise pictura.Error(f"{path}: expected at most {_MAX_BYTES >> 20} MiB, got {os.path.getsize(path) >> 20}")
     try:
         scene = _plain_values(pathlib.Path(path).read_bytes())
-    except Exception as error:  # any error that the bytes cause in the unpickler
+    except Exception as error:  # broken bytes can cause any exception in the unpickler
         raise pictura.Error(f"{path}: not a pickle of a scene: {type(error).__name__}: {error}") from None
     try:
         return pictura.Scenario.from_arrays(**_scenarionet_arrays(scene))
@@ -405,7 +410,8 @@ def _distances_m(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 
 
 def _with_road_on_left(edge: np.ndarray, centres: np.ndarray) -> np.ndarray:
-    """Returns an edge, reversed if for most of its pieces the nearest point of a lane is on their right."""
+    """Returns an edge with the road on its left: reversed if most of its pieces have the nearest lane on their
+    right."""
     pieces = np.unique(np.linspace(0, len(edge) - 2, _EDGE_VOTES).astype(int))
     middle, way = (edge[pieces, :2] + edge[pieces + 1, :2]) / 2, edge[pieces + 1, :2] - edge[pieces, :2]
     to_lanes = centres[None, :, :2] - middle[:, None]
@@ -417,7 +423,7 @@ def _with_road_on_left(edge: np.ndarray, centres: np.ndarray) -> np.ndarray:
 
 
 def _123d_tracks(scene: Any, iterations: range, is_flat: bool, dt_s: float) -> dict[str, Any]:
-    """Returns the tracks, the self-driving car's first."""
+    """Returns the tracks as arrays. "sdc" is the index of the self-driving car's track."""
     tokens: dict[str, int] = {}
     kinds: list[str] = []
     states: list[tuple[int, int, list[float]]] = []
@@ -443,7 +449,7 @@ def _123d_tracks(scene: Any, iterations: range, is_flat: bool, dt_s: float) -> d
     for track, step, numbers in states:
         values[track, step] = numbers
     valid = ~np.isnan(values[..., 0])
-    # Missing velocities are estimated from consecutive positions; the last step repeats the previous estimate.
+    # Missing velocities are estimated from consecutive positions. The last step uses the estimate of the previous step.
     moved = np.diff(values[..., :2], axis=1, append=np.nan) / dt_s
     for step in range(len(iterations)):
         known = values[:, step, 4:6]
@@ -523,12 +529,12 @@ def _123d_lights(scene: Any, iterations: range, lanes: dict[str, int]) -> dict[s
 
 
 def from_py123d(scene: Any, *, radius_m: float = 200.0) -> pictura.Scenario:
-    """Converts the scene of a py123d.api.SceneAPI: nuPlan, Argoverse 2, nuScenes, Waymo and others through one
-    interface.
+    """Converts a scene of py123d (py123d.api.SceneAPI), which reads nuPlan, Argoverse 2, nuScenes, Waymo and others.
 
-    radius_m: radius around the self-driving car at the scene's present, within which maps of whole towns are kept. The
-    scene keeps road users, lanes with links, neighbours, limits and the widths between their boundaries, lines, edges,
-    crosswalks, stop signs and lights. Raises pictura.Error naming the scene and the part.
+    radius_m: maps of whole towns are cropped to this radius around the self-driving car's position at the scene's
+    current step. The result has road users, lines, edges, crosswalks, stop signs, lights, and lanes with links,
+    neighbours, speed limits, and widths from their boundaries. Raises pictura.Error, which names the scene and the
+    part.
 
     Examples:
         >>> from pictura.datasets import from_py123d # doctest: +SKIP
@@ -550,7 +556,7 @@ def from_py123d(scene: Any, *, radius_m: float = 200.0) -> pictura.Scenario:
         return [each for found in world.get_map_objects_in_radius(ego.center_2d, radius_m, [layer]).values() for each in found]
 
     try:
-        # Rounded, since the duration is a mean of times that are no exact multiples.
+        # The duration is rounded, because it is a mean of slightly varying intervals.
         is_flat, dt_s = not world.map_has_z, round(float(metadata.iteration_duration_s), 3)
         tracks = _123d_tracks(scene, iterations, is_flat, dt_s)
         sdc_track = tracks.pop("sdc")

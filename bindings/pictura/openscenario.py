@@ -1,6 +1,7 @@
-"""Recorded drives as ASAM OpenSCENARIO XML 1.2, for the simulators and viewers that play it.
+"""Export of recorded scenes as ASAM OpenSCENARIO XML 1.2, for simulators and viewers that read this format.
 
-Every road user follows its recorded places in time. Lights are not written: OpenSCENARIO names them by the signals of a road network.
+Every road user follows its recorded positions at the recorded times. Lights are not written, because OpenSCENARIO
+refers to lights by the signals of a road network.
 """
 
 from __future__ import annotations
@@ -15,18 +16,20 @@ import numpy as np
 from pictura import _pictura
 
 _TYPES = {name: i for i, name in enumerate(_pictura.TRACK_TYPES)}
-# Shares of a box's length: from its centre to the rear axle, whose middle on the ground is a vehicle's place by the standard, and between axles.
+# Distance from the box's centre to the rear axle, and wheelbase, as shares of the box's length. The standard defines a
+# vehicle's position as the middle of its rear axle on the ground.
 _REAR_AXLE, _WHEELBASE = 0.3, 0.6
-# What the format asks of vehicles and no recording has.
+# Attributes of vehicles that the format requires, and that recordings do not contain.
 _MAX_SPEED, _MAX_ACCELERATION, _MAX_STEERING, _WHEEL_DIAMETER, _MASS = "69.5", "10", "0.7", "0.6", "75"
 
 
 def write(scene: _pictura.Scenario, path: str | os.PathLike, *, road_network: str = "") -> None:
-    """Writes a scene as *.xosc, whole or not at all: one that was recorded, loaded, or saved by `pictura simulate --scene`.
+    """Writes a scene to the file `path` (*.xosc). The file is written completely or not at all.
 
-    Places and times are the file's, from the scene's start_step on, which is time 0. Road users are there from their first state on to their
-    last one; where the recording has gaps between, they pass from one state to the next. road_network: the name of the map's OpenDRIVE
-    file, as players of the file find it; '': none. Raises pictura.UsageError for another ending, and where no road user or step is left.
+    Positions are in the coordinates of the scene's file. Time 0 is the scene's start_step. Each road user is present
+    from its first to its last recorded state; in gaps of the recording it moves from one state to the next.
+    road_network: path of the map's OpenDRIVE file, which programs that read the *.xosc file use; '': none. Raises
+    pictura.UsageError for another file extension, or if no road users or fewer than two steps remain.
     """
     path = pathlib.Path(path)
     if path.suffix != ".xosc":
@@ -47,7 +50,7 @@ def _document(scene: _pictura.Scenario, road_network: str) -> ET.Element:
     if not len(present) or tracks["valid"].shape[1] < 2:
         raise _pictura.UsageError(f"scene {scene.id}: expected road users and two steps or more from step {scene.start_step} on")
     root = ET.Element("OpenSCENARIO")
-    # A fixed date: the same scene gives the same file.
+    # The date is fixed, so that equal scenes give equal files.
     _add(root, "FileHeader", revMajor=1, revMinor=2, date="2000-01-01T00:00:00", description=f"Recorded scene {scene.id}", author="pictura")
     _add(root, "CatalogLocations")
     roads = _add(root, "RoadNetwork")
@@ -111,7 +114,7 @@ def _add_motion(init: ET.Element, act: ET.Element, scene: _pictura.Scenario, tra
     def add_place(parent: ET.Element, step: int) -> None:
         x, y, z = (float(value) for value in places[step])
         position = _add(parent, "Position")
-        # Tenths of millimetres: more digits than a place of kilometres has as nine of them.
+        # Positions have four decimals (0.1 mm), because nine significant digits are too few for large coordinates.
         _add(position, "WorldPosition", x=f"{x:.4f}", y=f"{y:.4f}", z=f"{z:.4f}", h=f"{heading[step]:.6f}")
 
     def add_event(action: str, at_s: float) -> ET.Element:

@@ -5,15 +5,14 @@
     plot.figure(plot.probe_means("probe_removal/summary.json"))  # a Matplotlib figure, for notebooks
 
 A function whose name ends in _curves, _rates, _costs, _parts or _means reads files and returns a Chart, the data to
-draw. figure() and save() draw a Chart. Only these two need Matplotlib; the rest needs only Python 3.11, neither NumPy
-nor pictura's extensions. `pictura plot`, `pictura probe` and `pictura bench --plot` contain this file and run it as a
-program:
+draw. figure() and save() draw a Chart, and need Matplotlib. The other functions need only Python 3.11. `pictura plot`,
+`pictura probe` and `pictura bench --plot` contain a copy of this file, and run it as a program:
 
     python -m pictura.plot '{"chart": "run_curves", "runs": ["runs/a"], "out": "curves.png"}'
 
-The program takes a function's name and arguments as one JSON object, with the picture's name as "out". It exits with 0,
-with 1 after an error, or with 3 without Matplotlib, after writing the chart's data as JSON to the picture's name and
-".json".
+The program's argument is a JSON object with the name and arguments of a function, and the picture's file name as "out".
+The exit status is 0, or 1 after an error. If Matplotlib is missing, the program writes the chart's data as JSON to
+OUT.json, and the exit status is 3.
 """
 
 from __future__ import annotations
@@ -39,9 +38,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito's colours, which are distinct for colour-blind readers, without their yellow, which is faint on white.
+# Okabe and Ito's colours, which colour-blind people can distinguish. Yellow is omitted, because it is faint on white.
 SERIES_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#5A5A5A")
-# Colours of a share from 0 to 1: hidden, half seen, seen whole.
+# Colours of a visibility from 0 to 1: hidden, half visible, fully visible.
 SHARE_COLORS = ("#D73027", "#FEE090", "#4575B4")
 _REVEALING = ("#E3E5E8", "#5A6068")  # line of sight opens rarely, often
 
@@ -53,32 +52,32 @@ METRICS = (
     "driving/off_road_per_1000_steps",
     "driving/red_light_per_1000_steps",
 )
-# Maximum number of points of a run's curve; longer curves show means of consecutive updates.
+# Maximum number of points of a run's curve. In longer runs, each point is a mean of consecutive updates.
 MAX_RUN_POINTS = 200
 _NAN = math.nan
 
 
 class PlotError(Exception):
-    """Error in a file or an argument, which it names."""
+    """Error in a file or an argument. The message names the file or argument."""
 
 
 class MissingMatplotlib(PlotError):
-    """Error of a chart that needs Matplotlib, which is missing."""
+    """Matplotlib is missing, so the chart cannot be drawn."""
 
 
 @dataclass
 class Series:
-    """One line. Points that are not finite, or not above 0 on a logarithmic axis, leave a gap."""
+    """One line of a panel. A point leaves a gap if it is not finite, or if it is 0 or less on a logarithmic axis."""
 
     name: str
     x: list[float] = field(default_factory=list)
     y: list[float] = field(default_factory=list)
-    low: list[float] = field(default_factory=list)  # lower edge of a band behind the line: as long as the line, or empty
+    low: list[float] = field(default_factory=list)  # lower edge of a band; empty: no band
     high: list[float] = field(default_factory=list)
     dashed: bool = False
 
     def add(self, x: float, y: float | None, low: float | None = None, high: float | None = None) -> None:
-        """Adds a point; None becomes NaN. Either all points of a series have a band, or none has."""
+        """Adds a point; None becomes NaN. Either all points of a series have a band, or no point has one."""
         for values, value in ((self.x, x), (self.y, y), (self.low, low), (self.high, high)):
             values.append(_NAN if value is None else float(value))
 
@@ -96,9 +95,9 @@ class Panel:
     series: list[Series] = field(default_factory=list)
     x_scale: str = "linear"  # or "log", with ticks at the points
     y_scale: str = "linear"  # or "log"
-    starts_at_zero: bool = False  # the y axis
-    marks: list[tuple[float, str]] = field(default_factory=list)  # dashed lines across the panel, labelled above it
-    strip: list[tuple[float, str]] = field(default_factory=list)  # colours under the x axis, which reach half way to their neighbours
+    starts_at_zero: bool = False  # whether the y axis starts at 0
+    marks: list[tuple[float, str]] = field(default_factory=list)  # dashed vertical lines and their labels
+    strip: list[tuple[float, str]] = field(default_factory=list)  # colours under the x axis
 
 
 @dataclass
@@ -106,7 +105,7 @@ class Chart:
     panels: list[Panel]
     columns: int = 3
     panel_size_in: tuple[float, float] = (3.5, 2.7)
-    facts: dict[str, Any] = field(default_factory=dict)  # facts for a report, besides the picture's name
+    facts: dict[str, Any] = field(default_factory=dict)  # further facts that the program prints
 
 
 def _finite_or_null(value: float) -> float | None:
@@ -133,7 +132,7 @@ class _Run:
     folder: str
     path: str
     columns: dict[str, list[float]]
-    settings: Any  # config.toml without run.seed; the folder if runs are not grouped
+    settings: Any  # key by which runs are grouped: config.toml without run.seed; the folder if runs are not grouped
     seed: int = 0
 
     def column(self, name: str) -> list[float]:
@@ -142,7 +141,7 @@ class _Run:
 
 
 def _number(text: str) -> float | None:
-    # float() accepts texts that are never written: with spaces and underscores.
+    # float() also accepts spaces and underscores, which valid files do not contain.
     try:
         return None if "_" in text or text != text.strip() else float(text)
     except ValueError:
@@ -191,12 +190,12 @@ def _read_run(folder: str, groups_seeds: bool) -> _Run:
 
 
 def _column_of(metric: str, run: _Run) -> str:
-    """Returns the column of a metric, given in full or by the part after the slash."""
+    """Returns the column of a metric. `metric` is the column's name, or the part after the slash."""
     if metric in run.columns:
         return metric
     found = [name for name in run.columns if name.endswith(f"/{metric}")]
     _need(len(found) < 2, f"{run.path}: '{metric}' may be {' or '.join(found)}")
-    return found[0] if found else metric  # column() raises if there is none
+    return found[0] if found else metric  # column() raises PlotError if no column matches
 
 
 def _mean_of_finite(values: Iterable[float]) -> float:
@@ -222,7 +221,7 @@ def _curve_of(run: _Run, x: str, column: str) -> Series:
 
 
 def _height_at(curve: Series, x: float) -> float:
-    """Interpolates a curve between its points; NaN beside a point that is not finite."""
+    """Interpolates a curve between its points. The result is NaN next to a point that is not finite."""
     after = next((i for i, at in enumerate(curve.x) if at >= x), len(curve.x) - 1)
     if after == 0 or curve.x[after] == x:
         return curve.y[after]
@@ -231,13 +230,13 @@ def _height_at(curve: Series, x: float) -> float:
 
 
 def _mean_of_curves(curves: list[Series], name: str) -> Series:
-    """Returns the mean of curves where all of them are defined, with a band from the lowest to the highest."""
+    """Returns the mean of curves over the range in which all are defined, with a band from their minimum to maximum."""
     low, high = max(curve.x[0] for curve in curves), min(curve.x[-1] for curve in curves)
     _need(low <= high, f"{name}: these runs share no range; --group none draws them separately")
     last = max(len(curve.x) for curve in curves) - 1
     mean = Series(name)
     for i in range(last + 1):
-        x = high if i == last else low + i / last * (high - low)  # rounding must not exceed the end
+        x = high if i == last else low + i / last * (high - low)  # rounding must not move the last point beyond the end
         heights = [_height_at(curve, x) for curve in curves]
         mean.add(x, *((sum(heights) / len(heights), min(heights), max(heights)) if all(map(math.isfinite, heights)) else (None,)))
     return mean
@@ -248,7 +247,7 @@ def _name_of_group(names: list[str]) -> str:
     if len(names) == 1:
         return names[0]
     begin = os.path.commonprefix(names)
-    # Common begin and end must not overlap in the shortest name.
+    # The common prefix and suffix must not overlap in the shortest name.
     end = os.path.commonprefix([name[len(begin) :][::-1] for name in names])[::-1]
     return f"{begin}*{end}, {len(names)} seeds"
 
@@ -268,7 +267,7 @@ _UNITS_OF_WHOLE_NAMES = {"episode_return": "sum of rewards", "entropy": "nats", 
 
 
 def _labels_of(column: str) -> tuple[str, str]:
-    """Returns title and unit of a column: "driving/goals_per_1000_steps" is Goals per 1,000 agent-steps."""
+    """Returns title and unit of a column: "driving/goals_per_1000_steps" has the title Goals per 1,000 agent-steps."""
     title = column.split("/")[-1]
     suffix = next((suffix for suffix in _UNITS if title.endswith(suffix)), "")
     unit = _UNITS.get(suffix, "")
@@ -281,12 +280,12 @@ def _labels_of(column: str) -> tuple[str, str]:
 def run_curves(runs: Sequence[str], metrics: Sequence[str] = METRICS, x: str = "agent_steps", group: str = "seeds") -> Chart:
     """Returns curves of training runs, with a panel for each metric and a line for each run.
 
-    runs: folders that `pictura train` wrote. metrics: columns of progress.csv, or the part after the slash if only one
-    column has it. x: "agent_steps", or "hours" of rollouts and updates. group: "seeds" draws one line for runs whose
-    config.toml differ only in run.seed: their mean over the stretch that all of them cover, with a band from the lowest
-    to the highest; "none" draws a line for each run. A line has at most MAX_RUN_POINTS points, each the mean of equally
-    many consecutive updates. Raises PlotError naming a missing folder, file or column, or runs that have no stretch in
-    common.
+    runs: folders that `pictura train` wrote. metrics: columns of progress.csv; the part after the slash is enough if it
+    is unique. x: "agent_steps", or "hours" of rollouts and updates. group: "seeds" draws one line for all runs whose
+    config.toml differ only in run.seed; "none" draws one line for each run. A line of several runs is their mean over
+    the range of x that all of them cover, with a band from their minimum to their maximum. A line has at most
+    MAX_RUN_POINTS points; each is the mean of the same number of consecutive updates. Raises PlotError, which names a
+    missing folder, file or column, or runs without a common range of x.
 
     Examples:
         >>> chart = plot.run_curves(["runs/a", "runs/b"], x="hours") # doctest: +SKIP
@@ -302,7 +301,7 @@ def run_curves(runs: Sequence[str], metrics: Sequence[str] = METRICS, x: str = "
     if len(set(names)) < len(names):
         names = [run.folder for run in read]
 
-    members: list[list[int]] = []  # indices of the runs of each line
+    members: list[list[int]] = []  # for each line, the indices of its runs
     for i, run in enumerate(read):
         same = next((lines for lines in members if read[lines[0]].settings == run.settings), None)
         if same is None:
@@ -356,15 +355,15 @@ _PROTOCOL = (
     ("km_per_infraction", "Distance per infraction", "distance (km)"),
     ("km_per_at_fault_infraction", "Distance per at-fault infraction", "distance (km)"),
 )
-# Metrics without a panel if no row has them.
+# Optional metrics: they have no panel if no row has them.
 _OPTIONAL = ("km_per_infraction", "km_per_at_fault_infraction")
 
 
 def _evaluation_series(line: dict[str, Any], metric: str, x: str) -> Series:
-    """Returns a metric at medium density, with a band from the lowest to the highest of all densities."""
+    """Returns a metric at medium density, with a band from the minimum to the maximum over all densities."""
     series = Series(line["name"], dashed=bool(line.get("dashed", False)))
     for point in line["points"]:
-        # The value is None if its divisor is 0.
+        # A metric is None if its denominator is 0.
         given = {row["density"]: row.get(metric) if metric in _OPTIONAL else row[metric] for row in point["rows"]}
         known = [value for value in given.values() if value is not None] or [None]
         series.add(point["gpu_hours" if x == "hours" else "agent_steps"], given["medium"], min(known), max(known))
@@ -374,8 +373,8 @@ def _evaluation_series(line: dict[str, Any], metric: str, x: str) -> Series:
 def evaluation_curves(path: str, x: str = "agent_steps") -> Chart:
     """Returns metrics of the evaluation protocol during trainings: medium traffic, with a band over all densities.
 
-    path: output of `scripts/reproduce_table --curves`. x: "agent_steps", or "hours" of one GPU. Raises PlotError naming
-    the file, the line and what is missing.
+    path: output of `scripts/reproduce_table --curves`. x: "agent_steps", or "hours" of one GPU. Raises PlotError, which
+    names the file, the line and the missing value.
 
     Examples:
         >>> from pictura import plot
@@ -415,8 +414,8 @@ def evaluation_curves(path: str, x: str = "agent_steps") -> Chart:
 def severity_curves(results: Sequence[str]) -> Chart:
     """Returns metrics of the evaluation protocol by the severity of randomized cameras, with 95 % intervals.
 
-    results: outputs of `pictura evaluate --camera-severity ... --json`; each file and density is a line. Raises
-    PlotError naming the file and what is missing.
+    results: outputs of `pictura evaluate --camera-severity ... --json`. The chart has one line for each file and
+    density. Raises PlotError, which names the file and the missing value.
 
     Examples:
         >>> chart = plot.severity_curves(["severities.json"]) # doctest: +SKIP
@@ -448,8 +447,8 @@ _RATE, _SIZE = "agent-steps/s", "width of a 16:9 image (px)"
 
 
 def _read_results(paths: Sequence[str]) -> list[tuple[str, float]]:
-    """Returns names and values of results: outputs of `pictura bench --json`, and files of scripts/gpu_check, which
-    hold several."""
+    """Returns names and values of benchmark results, from outputs of `pictura bench --json` or files of
+    scripts/gpu_check."""
     results: list[tuple[str, float]] = []
     for path in paths:
         content, before = _read_json(path), len(results)
@@ -466,8 +465,7 @@ def _sweep(title: str, x_label: str, y_label: str) -> Panel:
 
 
 def _add_point(panel: Panel, name: str, x: float, y: float) -> None:
-    """Adds a point to the series of that name. Points ascend in x; of several points with the same x the first is
-    kept."""
+    """Adds a point to the series `name`, whose points are sorted by x. A second point with the same x is ignored."""
     series = next((series for series in panel.series if series.name == name), None)
     if series is None:
         series = Series(name)
@@ -527,8 +525,8 @@ def step_costs(results: Sequence[str]) -> Chart:
 
 
 def rank_rates(results: Sequence[str]) -> Chart:
-    """Returns rates and efficiencies by number of GPUs, from files of scripts/gpu_ranks: with a fixed number of agents
-    on each GPU, and with a fixed total.
+    """Returns rates and efficiencies by number of GPUs, from files of scripts/gpu_ranks. Two panels have a fixed number
+    of agents on each GPU, and two a fixed total number.
 
     Examples:
         >>> from pictura import plot
@@ -561,10 +559,10 @@ def rank_rates(results: Sequence[str]) -> Chart:
 
 
 def breakdown_parts(results: Sequence[str], parts: Sequence[str], paper: dict[str, dict[str, float]]) -> Chart:
-    """Returns the seconds of an update by size, from `pictura bench breakdown`, with the paper's for comparison.
+    """Returns the duration of an update by image size, from `pictura bench breakdown`, and the paper's durations.
 
-    parts: columns of the table; the third panel shows those of the first case. paper: the paper's seconds by size, of
-    "total" and of "rendering".
+    parts: columns of the table; the third panel shows them for the first case. paper: the paper's seconds for "total"
+    and "rendering", by image size.
 
     Examples:
         >>> parts = ["simulation", "rendering"] # doctest: +SKIP
@@ -608,8 +606,8 @@ def _share_color(share: float) -> str:
 
 
 def _names_of(summary: dict[str, Any]) -> dict[str, str]:
-    """Returns the policies' names in charts by their names in rows: untrained weights respond in place of some
-    policies."""
+    """Returns names of policies for charts, by their names in rows. Policies with untrained weights are "untrained
+    NAME"."""
     return {one["name"]: ("untrained " if one.get("untrained_hash") else "") + one["name"] for one in summary["policy"]}
 
 
@@ -645,7 +643,7 @@ def _pedestrian_means(summary: dict[str, Any]) -> Chart:
         lines = {name: Series(shown) for name, shown in _names_of(summary).items()}
         panel = Panel(title, f"distance from where it is first seen (m)\n{_SEEN}", f"mean {label}", list(lines.values()))
         for row in summary["rows"]:
-            # Only points that most paths have: the ends belong to few paths.
+            # Points that fewer than half of the paths have are omitted.
             if row["from_first_sight_m"] is None or 2 * row["cases"] < summary["paths"]:
                 continue
             lines[row["policy"]].add_estimate(row["from_first_sight_m"], row[change], row[f"{change}_half_width_95"])
@@ -660,7 +658,8 @@ def _with_walls(title: str, walls: bool) -> str:
 
 
 def _reveal_strip(rows: list[dict[str, Any]], num_steps: int) -> list[tuple[float, str]]:
-    """Returns a strip that is dark from the first policy's 10th percentile of reveals to the last policy's 90th."""
+    """Returns a strip of colours for the time when the line of sight opens. It is dark from the minimum of the
+    policies' 10th percentiles to the maximum of their 90th percentiles."""
     quantiles_s = [(row["reveal_s_p10"], row["reveal_s_p90"]) for row in rows if row["reveal_s_p10"] is not None]
     if not quantiles_s:
         return []
@@ -693,12 +692,12 @@ _PROBES = {"removal": _removal_means, "pedestrian": _pedestrian_means, "corner":
 
 
 def probe_means(summary: str, names: dict[str, str] | None = None) -> Chart:
-    """Returns the means of a probe with their 95 % intervals, like the paper's figures, from summary.json of `pictura
-    probe`.
+    """Returns the means of a probe with 95 % intervals, like the paper's figures, from summary.json of `pictura probe`.
 
-    For removal: absolute changes by occlusion of the user, and for wholly hidden users by distance. For pedestrian:
-    changes relative to where the pedestrian is first seen, with its visibility as a strip. For corner: mean speeds
-    since the takeover. names: names of policies in the legend, where they differ from those in the file.
+    The chart of `removal` shows absolute changes by occlusion of the road user, and for fully hidden road users by
+    distance. The chart of `pedestrian` shows changes by the distance to the point where the pedestrian is first
+    visible, with its visibility as a strip. The chart of `corner` shows mean speeds after the takeover. names: names of
+    policies in the legend; default: the names in the file.
 
     Examples:
         >>> plot.save(plot.probe_means("probe_removal/summary.json"), "means.png") # doctest: +SKIP
@@ -716,16 +715,16 @@ def probe_means(summary: str, names: dict[str, str] | None = None) -> Chart:
 
 
 def _read_cases(file_name: str, /, **wanted: str) -> list[dict[str, str]]:
-    """Returns the rows of cases.csv that have these values."""
+    """Returns the rows of cases.csv that have the wanted values."""
     with open(file_name, encoding="utf-8", newline="") as file:
         return [row for row in csv.DictReader(file) if all(row[name] == value for name, value in wanted.items())]
 
 
 def path_curves(folder: str, path: int, marks: Sequence[tuple[float, str]] = ()) -> Chart:
-    """Returns the changes of value and braking along one path of `pictura probe pedestrian`, with the visibility as a
-    strip.
+    """Returns the changes of value and braking along one path of `pictura probe pedestrian`, and the pedestrian's
+    visibility as a strip.
 
-    marks: positions along the path in m, and their letters.
+    marks: positions along the path in metres, and the letter that labels each.
 
     Examples:
         >>> plot.save(plot.path_curves("probe_pedestrian", path=3), "path.png") # doctest: +SKIP
@@ -742,7 +741,8 @@ def path_curves(folder: str, path: int, marks: Sequence[tuple[float, str]] = ())
 
 
 def takeover_curves(folder: str, pair: int) -> Chart:
-    """Returns the speeds of one pair of `pictura probe corner` towards the hidden vehicle, with walls and without.
+    """Returns the policies' speeds towards the hidden vehicle in one pair of `pictura probe corner`, with and without
+    walls.
 
     Examples:
         >>> plot.save(plot.takeover_curves("probe_corner", pair=2), "pair.png") # doctest: +SKIP
@@ -771,7 +771,7 @@ def takeover_curves(folder: str, pair: int) -> Chart:
 # ---- drawing
 
 _DPI = 150
-_PAGE_DPI = 100  # text size as in the pictures above
+_PAGE_DPI = 100  # text size like in the probe's pictures
 _STYLE = {
     "font.family": "DejaVu Sans",  # font that comes with Matplotlib
     "font.size": 9.5,
@@ -812,14 +812,14 @@ def _matplotlib(what: str) -> Any:
 def _tick_text(value: float, _position: int = 0) -> str:
     """Returns a tick's text: "1.5G", "20k", "0.02"."""
     for unit, suffix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
-        # 8192 and 1024 are clearer when written in full.
+        # Powers of two such as 1024 and 8192 are clearer in full.
         if abs(value) >= unit * (10 if suffix == "k" else 1) * (1 - 1e-9) and (suffix != "k" or value % 1000 == 0):
             return f"{value / unit:g}{suffix}".replace("-", "\N{MINUS SIGN}")
     return f"{value:g}".replace("-", "\N{MINUS SIGN}")
 
 
 def _apart(values: Iterable[float]) -> list[float]:
-    """Returns as many of these values, in ascending order, as have room for their labels on a logarithmic axis."""
+    """Returns the values whose labels fit on a logarithmic axis, in ascending order."""
     ascending, kept = sorted(values), []
     for value in ascending:
         if not kept or math.log(value / kept[-1]) > math.log(ascending[-1] / ascending[0]) / 8:
@@ -851,7 +851,7 @@ def _set_scale(axes: Axes, panel: Panel) -> None:
 
 
 def _lone_points(series: Series) -> list[int]:
-    """Returns the points between gaps, which a line does not show."""
+    """Returns isolated points between gaps, which are not visible as a line."""
     shown = [False, *(math.isfinite(x) and math.isfinite(y) for x, y in zip(series.x, series.y, strict=True)), False]
     return [i for i in range(len(series.x)) if shown[i + 1] and not shown[i] and not shown[i + 2]]
 
@@ -898,9 +898,9 @@ def _colors_of(names: Iterable[str]) -> dict[str, str]:
 
 
 def figure(chart: Chart, width_in: float | None = None) -> Figure:
-    """Draws a chart. Lines have the series' names as labels. width_in: in inches; default: by the chart's panels.
+    """Draws a chart. Returns a Matplotlib figure, in which lines have the names of series as labels.
 
-    Raises MissingMatplotlib.
+    width_in: width in inches; default: depends on the number of panels. Raises MissingMatplotlib.
 
     Examples:
         >>> from pictura import plot
@@ -931,7 +931,7 @@ def figure(chart: Chart, width_in: float | None = None) -> Figure:
 
 
 def _write(path: str, content: bytes) -> None:
-    """Writes a temporary file and renames it, so that no reader sees a partial file. Targets that are no regular files
+    """Writes a temporary file and renames it, so that no reader sees a partial file. Other targets than regular files
     are written directly."""
     if path.startswith(("/dev/", "/proc/")) or (os.path.exists(path) and not os.path.isfile(path)):
         pathlib.Path(path).write_bytes(content)
@@ -939,7 +939,7 @@ def _write(path: str, content: bytes) -> None:
     target = os.path.realpath(path)
     if os.path.exists(target) and not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, "is read-only", path)
-    # Named like temporary files of the command, whose next call removes them if this call was killed.
+    # The name is that of the command's temporary files. The next command removes the file if this process was killed.
     temporary = os.path.join(os.path.dirname(target), f".pictura-{secrets.token_hex(8)}.tmp")
     try:
         with open(temporary, "xb") as file:
@@ -955,9 +955,10 @@ def _write(path: str, content: bytes) -> None:
 
 
 def save(chart: Chart, path: str) -> None:
-    """Draws a chart into a file: vector graphics if its name ends in .svg, else a PNG.
+    """Draws a chart into a file: vector graphics if the file's name ends in .svg, else a PNG.
 
-    Without Matplotlib it writes the chart's panels to `path` and ".json", and raises MissingMatplotlib. Raises OSError.
+    If Matplotlib is missing, it writes the chart's panels to the file `path` + ".json" and raises MissingMatplotlib.
+    Raises OSError if the file cannot be written.
 
     Examples:
         >>> from pictura import plot
@@ -1005,9 +1006,10 @@ def append_to(picture: str, chart: Chart) -> None:
 
 
 def probe_charts(folder: str, pages: Sequence[dict[str, Any]] = ()) -> None:
-    """Draws the charts of a folder of `pictura probe`: KIND.png with its means, and curves below its pictures.
+    """Draws the charts for an output folder of `pictura probe`: means in KIND.png, and curves below the probe's
+    pictures.
 
-    pages: for each picture its file ("picture"), and the arguments of path_curves() or takeover_curves().
+    pages: for each picture, the file name ("picture") and the arguments of path_curves() or takeover_curves().
 
     Examples:
         >>> plot.probe_charts("probe_removal") # doctest: +SKIP
@@ -1025,8 +1027,8 @@ CHARTS = {chart.__name__: chart for chart in (run_curves, evaluation_curves, sev
 
 
 def _answer(request: dict[str, Any]) -> None:
-    """Draws the chart of a request. "report" in the request selects what is printed: "json", "text", or nothing if
-    absent."""
+    """Draws the chart of a request. The request's "report" selects the printed output: "json" or "text"; without
+    "report" nothing is printed."""
     name, report = request.pop("chart", None), request.pop("report", None)
     if name == "probe_charts":
         return probe_charts(**request)
@@ -1043,7 +1045,7 @@ def _answer(request: dict[str, Any]) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Executes the request in the only argument. Returns the exit status."""
+    """Executes the request in the program's only argument. Returns the exit status."""
     if sys.version_info < (3, 11):
         print(f"error: charts: {sys.executable} is Python {sys.version.split()[0]}: expected 3.11 or later", file=sys.stderr)
         return 3

@@ -1,4 +1,4 @@
-"""Worlds of the configurations that `pictura train` takes, as arguments of environments."""
+"""Converts training configurations of `pictura train` to arguments of environments."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any
 
 import pictura
 
-# Configurations by the names of presets; they lie beside this file.
+# File of each preset, in the folder configs beside this file.
 PRESETS = {"demo": "demo.toml", "town": "agent.toml", "paper": "paper.toml"}
-# Keys of [simulator] that say which worlds there are, and who else drives: not of one simulator.
+# Keys of [simulator] that are not arguments of pictura.Simulator: they describe the set of worlds.
 _OF_THE_RUN = ("backend", "maps", "map_copies", "num_slots", "min_agents", "max_agents")
 
 
 def preset_config(preset: str) -> dict[str, Any]:
-    """The configuration of a preset, by tables. docs/reference/configuration.md has its keys.
+    """Returns the configuration of a preset as a dict of tables. docs/reference/configuration.md describes the keys.
 
     Args:
         preset: "demo", "town" or "paper".
@@ -35,14 +35,14 @@ def preset_config(preset: str) -> dict[str, Any]:
 
 
 def preset_options(preset: str, maps: Any = None, num_agents: int | None = None, **given: Any) -> dict[str, Any]:
-    """Arguments of pictura.envs.gymnasium_vector.DriveVectorEnv for the world, cameras and observation of a preset.
+    """Returns the arguments of pictura.envs.gymnasium_vector.DriveVectorEnv that give a preset's world and observation.
 
     Args:
         preset: "demo", "town" or "paper".
-        maps: In place of the preset's.
-        num_agents: Of each world, in place of numbers that are drawn.
-        given: Other arguments, in place of the preset's; of `conditioning` those that are named. num_envs: slots in
-            place of the preset's.
+        maps: Maps instead of the preset's maps.
+        num_agents: Number of agents in each world; None: the preset draws a number for each world.
+        given: Other arguments, which override the preset. `conditioning` overrides only the values that it names, and
+            num_envs the number of slots.
 
     Raises:
         pictura.UsageError: There is no such preset.
@@ -70,7 +70,7 @@ def preset_options(preset: str, maps: Any = None, num_agents: int | None = None,
         num_slots = given.pop("num_envs", None) or simulator["num_slots"]
         ends = simulator["min_agents"], simulator["max_agents"]
         options["worlds"] = pictura.draw_worlds(given.get("seed", 0), num_slots, *ends, len(maps))
-        options["maps"] = maps[: len(options["worlds"])]  # taken in turn: the others have no world
+        options["maps"] = maps[: len(options["worlds"])]  # worlds use maps in turn, so further maps have no world
     else:
         options["num_agents"] = num_agents or simulator["max_agents"]
     return options | given

@@ -8,17 +8,17 @@ def make_queries(slots, *, hidden=None, inserted=None, leaves_gaps=False):
     """Returns queries for Simulator.observe(), on the CPU, as the tuple (queries, hidden, inserted) of NumPy arrays.
 
     Args:
-        slots: Slots that observe, int [n].
-        hidden: Boxes that each query leaves out: n lists of indices into the scene's boxes, or (indices, begin) with
-            those of query i from begin[i] up to begin[i + 1].
-        inserted: Boxes that each query adds: likewise, of INSERTED_DTYPE.
+        slots: Slots whose observations are requested, int [n].
+        hidden: Boxes that each query hides: n lists of indices into the scene's boxes, or a tuple (indices, begin), in
+            which query i hides indices[begin[i]:begin[i + 1]].
+        inserted: Boxes that each query inserts: n lists of INSERTED_DTYPE, or a tuple (boxes, begin) like `hidden`.
         leaves_gaps: bool, or bool [n]: whether rows of zeros replace hidden boxes.
 
     Returns:
-        tuple: QUERY_DTYPE [n], int32 [hidden in all], INSERTED_DTYPE [inserted in all].
+        tuple: QUERY_DTYPE [n], int32 [number of hidden boxes], INSERTED_DTYPE [number of inserted boxes].
 
     Raises:
-        pictura.Error: Names what does not fit.
+        pictura.Error: The length of a list is wrong; the message names the argument.
 
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load("procedural:3")], [(0, 8)])

@@ -1,8 +1,13 @@
-"""The realism score of rollouts of recorded scenes, and their other measures.
+"""Realism score and other metrics of rollouts (simulated continuations of recorded scenes).
 
-docs/explanation/realism.md has the definitions. Rollouts are arrays: track_ids int64 [tracks], all that the scene has at its step 10;
-center_m [rollouts, tracks, 80, 3], the boxes' centres in the coordinates of the scene's file after each of the 80 steps that follow;
-heading_rad [rollouts, tracks, 80]. They are rounded to float32, as files hold them.
+docs/explanation/realism.md defines the metrics. Rollouts are three arrays:
+
+- track_ids int64 [tracks]: all tracks that are present at step 10 of the scene
+- center_m [rollouts, tracks, 80, 3]: centres of the boxes after each of the next 80 steps, in the coordinates of the
+  scene's file
+- heading_rad [rollouts, tracks, 80]
+
+Numbers are rounded to float32, as in files of rollouts.
 """
 
 from __future__ import annotations
@@ -28,40 +33,42 @@ class Rollouts(NamedTuple):
 
 
 def score(scene: _pictura.Scenario, rollouts: Rollouts, *, version: str = "2025") -> dict[str, Any]:
-    """The scores of one scene by name, as one of the "scenes" that `pictura score --json` prints.
+    """Returns the scores of one scene by name, like one entry of "scenes" in the output of `pictura score --json`.
 
-    realism, likelihoods, ade_m, min_ade_m, collision_rate, comfortable_share, progress and more; None for what the scene has not.
-    Raises pictura.Error naming the track that is missing or unknown.
+    Names are realism, likelihoods, ade_m, min_ade_m, collision_rate, comfortable_share, progress and more. A score is
+    None if the scene does not define it. Raises pictura.Error, which names a missing or unknown track.
     """
     return json.loads(_pictura._realism_score(scene, *rollouts, version))
 
 
 def features(scene: _pictura.Scenario, rollouts: Rollouts) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """The ids of the scored road users, and by name what is compared of them: as recorded, and in each rollout.
+    """Returns the ids of the scored road users, their recorded features by name, and the features in each rollout.
 
-    Arrays are float64 [1 or rollouts, scored, 80]; NaN where a step has no value.
+    Recorded features are float64 [1, scored, 80], features of rollouts float64 [rollouts, scored, 80]. A step without a
+    value is NaN.
     """
     return _pictura._realism_features(scene, *rollouts)
 
 
 def read_rollouts(path: str | os.PathLike) -> dict[str, Rollouts]:
-    """The rollouts of a file by scenario id: one that `evaluate --rollouts` wrote, or a submission to the Waymo sim-agents challenge.
+    """Reads rollouts from a file. Returns them by scenario id.
 
-    Raises pictura.Error naming file, scenario and field.
+    The file is an output of `pictura evaluate --rollouts`, or a submission to the Waymo sim-agents challenge. Raises
+    pictura.Error, which names file, scenario and field.
     """
     return {scenario_id: Rollouts(*arrays) for scenario_id, arrays in _pictura._read_rollouts(os.fspath(path)).items()}
 
 
 def score_file(path: str | os.PathLike, scenes: str | list[str], *, version: str = "2025", num_threads: int = 0) -> dict[str, Any]:
-    """What `pictura score PATH --scenes SCENES --json` prints."""
+    """Returns the output of `pictura score PATH --scenes SCENES --json` as a dict."""
     names = [scenes] if isinstance(scenes, str) else list(scenes)
     return json.loads(_pictura._score_rollouts(os.fspath(path), names, version, num_threads))
 
 
 def recorded_rollouts(scene: _pictura.Scenario, count: int = 32) -> Rollouts:
-    """Rollouts that repeat the recording, the most that a simulator can score.
+    """Returns rollouts that repeat the recording, whose score is the upper bound of every simulator's score.
 
-    In gaps of the recording road users stay where they were; after their last state they keep its velocity.
+    In gaps of the recording, road users keep their last position. After their last state, they keep its velocity.
     """
     tracks = _present(scene)
     center, heading, valid = _centers(scene, tracks), tracks["heading_rad"], tracks["valid"]
@@ -75,7 +82,7 @@ def recorded_rollouts(scene: _pictura.Scenario, count: int = 32) -> Rollouts:
 
 
 def constant_velocity_rollouts(scene: _pictura.Scenario, count: int = 32) -> Rollouts:
-    """Rollouts in which all road users keep the velocity and heading of step 10."""
+    """Returns rollouts in which all road users keep the velocity and heading of step 10."""
     tracks = _present(scene)
     time_s = 0.1 * np.arange(1, STEPS + 1)
     velocity = np.pad(tracks["velocity_mps"][:, START], ((0, 0), (0, 1)))
@@ -90,7 +97,7 @@ def _present(scene: _pictura.Scenario) -> dict[str, np.ndarray]:
 
 
 def _centers(scene: _pictura.Scenario, tracks: dict[str, np.ndarray]) -> np.ndarray:
-    """[tracks, steps, 3] in the coordinates of the file."""
+    """Returns the centres of boxes, [tracks, steps, 3], in the coordinates of the scene's file."""
     foot = tracks["position_m"].astype(np.float64) + scene.origin_m
     foot[..., 2] += tracks["size_m"][:, None, 2] / 2
     return foot

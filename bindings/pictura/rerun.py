@@ -1,4 +1,4 @@
-"""Worlds in rerun's viewer (rerun.io), where its package is installed (`pip install rerun-sdk`).
+"""Logs maps, agents and images to rerun's viewer (rerun.io). Needs the package rerun-sdk (`pip install rerun-sdk`).
 
     import rerun, pictura.rerun
     rerun.init("pictura", spawn=True)
@@ -28,8 +28,8 @@ _STATUS_HALTED, _STATUS_ABSENT = 1, 3
 
 
 def log_map(road: pictura.Map, entity: str = "world/map", recording: Any = None) -> None:
-    """Logs marks, edges, stop lines, crosswalks and building lines of a map, once for all times. recording: a rerun
-    recording; default: the current one.
+    """Logs markings, edges, stop lines, crosswalks and building lines of a map as static data, which is valid at all
+    times. recording: a rerun recording; default: rerun's current recording.
 
     Examples:
         >>> rerun.init("pictura", spawn=True) # doctest: +SKIP
@@ -51,9 +51,10 @@ def log_map(road: pictura.Map, entity: str = "world/map", recording: Any = None)
 
 
 def log_world(simulator: pictura.Simulator, time_s: float, world: int = 0, entity: str = "world", recording: Any = None) -> None:
-    """Logs the agents of a world of a simulator on the CPU in their present state, as boxes with arrows for their
-    speed; halted agents are grey. Time is rerun's timeline "simulated", in seconds. Raises pictura.UsageError for a
-    simulator on a device or a world that does not exist.
+    """Logs the current state of the agents of one world: a box and a velocity arrow for each agent.
+
+    The simulator must be on the CPU. Halted agents are grey. time_s is the time in seconds on rerun's timeline
+    "simulated". Raises pictura.UsageError for a simulator on a CUDA device or a world that does not exist.
 
     Examples:
         >>> pictura.rerun.log_world(simulator, time_s=step * simulator.dt_s) # doctest: +SKIP
@@ -66,7 +67,7 @@ def log_world(simulator: pictura.Simulator, time_s: float, world: int = 0, entit
     slots = np.flatnonzero((simulator.world_of_slot.numpy() == world) & (state["status"] != _STATUS_ABSENT))
     heading = state["heading_rad"][slots]
     size = np.stack([state[f"{name}_m"][slots] for name in ("length", "width", "height")], axis=1)
-    # A state's position is that of the rear axle; the scene's boxes have the positions of bodies.
+    # Positions in the state are those of rear axles; boxes of the scene have the centres of bodies.
     boxes = np.asarray(simulator.scene.boxes).view(pictura.BOX_DTYPE)[:, 0]
     views = np.asarray(simulator.views).view(pictura.VIEW_DTYPE)[:, 0]
     center = boxes["center_m"][views["ego_agent"][slots]]
@@ -87,8 +88,8 @@ def log_world(simulator: pictura.Simulator, time_s: float, world: int = 0, entit
 
 
 def log_images(images: pictura.Images, view: int, rig: pictura.Rig, entity: str = "cameras", recording: Any = None) -> None:
-    """Logs the images of one view's cameras, each under the camera's name. images: uint8 or from 0 to 1, on the CPU, of
-    a rig of one size.
+    """Logs the images of one view, each under the name of its camera. images: uint8, or floats in [0, 1], on the CPU.
+    All cameras of the rig must have the same image size.
 
     Examples:
         >>> pictura.rerun.log_images(renderer.render(simulator.scene, simulator.views), view=0, rig=renderer.rig) # doctest: +SKIP

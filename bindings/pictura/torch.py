@@ -1,8 +1,7 @@
-"""Policies of the library as torch modules. docs/explanation/network.md defines the arithmetic.
+"""Policies as torch modules. docs/explanation/network.md defines the network.
 
-load_policy() reads the weights that training writes (policy.safetensors) or a checkpoint; save_policy() writes them
-back, so that weights trained in Python run in the `pictura` command; export_onnx() writes a policy for ONNX Runtime and
-others.
+load_policy() reads a checkpoint, or weights that training wrote (policy.safetensors). save_policy() writes weights, so
+that the `pictura` command can run a policy trained in Python. export_onnx() writes an ONNX model.
 """
 
 from __future__ import annotations
@@ -30,10 +29,11 @@ from pictura._pictura import _hash64, _removed_keys
 
 _SCALE_POSITION_M = 120.0  # scale of x and y in observations
 _NUM_ACTIONS = 12
-# Entity sets in the order of set_counts' columns: columns of a row, and number of points at its begin.
+# Entity sets, in the order of the columns of set_counts: number of features of a row, and number of points (x, y) with
+# which the row begins.
 _SETS = {"partners": (8, 1), "lanes": (7, 1), "boundaries": (7, 1), "controls": (7, 2), "walls": (7, 1)}
 _SEGMENTS = {"lanes", "boundaries", "walls"}  # sets of segments
-_ONNX_OPSET = 20  # first opset with Gelu
+_ONNX_OPSET = 20  # the first opset that has Gelu
 _MAGIC = b"PICTCKPT"
 _PREAMBLE = "<8sIIQ"
 
@@ -44,14 +44,17 @@ def _near_and_far(pairs_m: Tensor) -> Tensor:
 
 
 def point_features(rows: Tensor, points: int) -> Tensor:
-    """Features [..., 6 points] of the first `points` pairs of rows [..., n], which resolve points near the agent."""
+    """Returns features [..., 6 * points] of the points (x, y) with which rows [..., n] begin.
+
+    The features have a higher resolution near the agent than x and y.
+    """
     xy_m = (rows[..., : 2 * points] * _SCALE_POSITION_M).unflatten(-1, (points, 2))
     return torch.cat([_near_and_far(xy_m), xy_m / (xy_m.norm(dim=-1, keepdim=True) + 1.0)], -1).flatten(-2)
 
 
 def segment_features(rows: Tensor) -> Tensor:
-    """Features [..., 4] of the agent's position relative to the segments of rows [..., 7]: along them and to their
-    left."""
+    """Returns features [..., 4] of the agent's position relative to segments, rows [..., 7]: the offsets along the
+    segment and to its left."""
     x_m, y_m = (rows[..., :2] * -_SCALE_POSITION_M).unbind(-1)  # agent relative to the middle
     cos, sin = rows[..., 4:6].unbind(-1)
     return _near_and_far(torch.stack([x_m * cos + y_m * sin, cos * y_m - sin * x_m], -1))
@@ -62,8 +65,8 @@ def _normalize(x: Tensor) -> Tensor:
 
 
 def _refuse_removed(config: Mapping[str, Any]) -> None:
-    """Raises pictura.UsageError if the `policy` table holds a removed key with a value other than its only valid
-    one."""
+    """Raises pictura.UsageError if the `policy` table has a removed key with an invalid value. Each removed key has one
+    valid value."""
     for key, value, reason in _removed_keys():
         name = key.removeprefix("policy.")
         if name in config and json.dumps(config[name]) != value:
@@ -86,10 +89,10 @@ class _Encoder(nn.Module):
 
 
 class _Attention(nn.Module):
-    """Learned queries of each camera, which attend to the tokens of its feature map.
+    """Attention of learned queries of each camera to the tokens of the camera's feature map.
 
-    Queries are equal for all images, so scores are computed directly from tokens, q (W t) = (q W) t, and values from
-    weighted sums of tokens (docs/explanation/network.md): neither keys nor values are computed for each token.
+    All images use the same queries. Therefore scores are computed directly from tokens, q (W t) = (q W) t, and values
+    from weighted sums of tokens (docs/explanation/network.md). Keys and values of single tokens are not computed.
     """
 
     def __init__(self, cameras: int, queries: int, width: int, heads: int, mlp: int) -> None:
@@ -104,8 +107,8 @@ class _Attention(nn.Module):
             self.mlp_norm, self.mlp_hidden, self.mlp_out = nn.LayerNorm(width), nn.Linear(width, mlp), nn.Linear(mlp, width)
 
     def forward(self, maps: Tensor, first: int) -> Tensor:
-        """Returns [cameras, batch, width] for maps [cameras, batch, width, rows, columns] of cameras from number
-        `first` on."""
+        """Returns embeddings [cameras, batch, width] of feature maps [cameras, batch, width, rows, columns]. `first` is
+        the index of the first of these cameras in the rig."""
         cameras, rows, columns = maps.shape[0], *maps.shape[-2:]
         y = (torch.arange(rows, device=maps.device) + 0.5) * (math.pi / rows)
         x = (torch.arange(columns, device=maps.device) + 0.5) * (math.pi / columns)
@@ -127,24 +130,25 @@ class _Attention(nn.Module):
 
 
 class Policy(nn.Module):
-    """A policy of either modality: forward(observation) gives logits float32 [batch, 12] and values float32 [batch].
+    """A perspective policy, which reads images, or a vector policy, which reads entity sets.
 
-    observation: float32 tensors by the names of pictura.Simulator.observations, [batch, ...] on the module's device:
-    `ego`, `conditioning` and `waypoints`; for the vector policy the entity sets and `set_counts`; for the perspective
-    one `rgb` uint8 [batch, cameras, 3, height, width], or a list of such for cameras of several sizes in the order of
-    the rig. NumPy's arrays become tensors first.
+    forward(observation) returns logits float32 [batch, 12] and values float32 [batch]. The observation is a dict of
+    tensors [batch, ...] or NumPy arrays, with names and types as in pictura.Simulator.observations. Both policies read
+    `ego`, `conditioning` and `waypoints`. A vector policy also reads `set_counts` and the entity sets. A perspective
+    policy also reads `rgb`: uint8 [batch, cameras, 3, height, width]. If cameras have several sizes, `rgb` is a list of
+    tensors in the order of the rig, each for consecutive cameras of one size.
 
     Args:
         config: The `policy` table of a configuration (docs/reference/configuration.md).
-        num_cameras: Of a perspective policy.
-        walls: Whether a vector policy reads them.
+        num_cameras: Number of cameras of a perspective policy.
+        walls: Whether a vector policy reads the entity set `walls`.
 
     Attributes:
-        metadata: What the file of a policy that load_policy() read says beside the weights: `path`, `config` (the whole
-            configuration of its training), `schema`, `rig`, `update` and `agent_steps` among others; else empty.
+        metadata: Metadata of the file that load_policy() read: `path`, `config` (the whole configuration of the
+            training), `schema`, `rig`, `update`, `agent_steps` and more. Empty for a policy that is not from a file.
 
     Raises:
-        pictura.UsageError: The observation is not what the policy was trained to read.
+        pictura.UsageError: The observation lacks an array that the policy reads, or its images have another size.
 
     Examples:
         >>> from pictura.torch import Policy
@@ -197,7 +201,7 @@ class Policy(nn.Module):
         self.actor, self.critic = nn.Linear(inside, _NUM_ACTIONS), nn.Linear(inside, 1)
 
     def forward(self, observation: Mapping[str, Any]) -> tuple[Tensor, Tensor]:
-        """Logits float32 [batch, 12] and values float32 [batch] of an observation."""
+        """Returns logits float32 [batch, 12] and values float32 [batch] of an observation."""
         observation = self._read(observation)
         waypoints = observation["waypoints"].flatten(1)
         own = [observation["conditioning"].flatten(1), waypoints]
@@ -278,30 +282,33 @@ class Policy(nn.Module):
         return self.project(torch.cat(embedded, 1))
 
     def _maps(self, pixels: Tensor) -> Tensor:
-        """Returns feature maps [cameras, batch, width, rows, columns] of pixels uint8 [batch, cameras, 3, height,
-        width]. The cameras share the convolutions, so they form one batch."""
+        """Returns feature maps [cameras, batch, width, rows, columns] of images uint8 [batch, cameras, 3, height,
+        width].
+
+        All cameras share the convolutions, so their images form one batch.
+        """
         patch, x = self.patch_px, pixels.transpose(0, 1)
         right, below = -x.shape[4] % patch, -x.shape[3] % patch
         if right or below:
             x = functional.pad(x, (0, right, 0, below))
         x = x.flatten(0, 1)
-        # Patches are taken before the conversion from bytes. Channels are last on CUDA, as tensor cores read them; on a
-        # CPU this would be slower.
+        # Patches are extracted from bytes, before the conversion to floats. On CUDA channels are the last axis, which
+        # tensor cores need; on the CPU this layout is slower.
         layout = torch.channels_last if x.is_cuda else torch.contiguous_format
         x = functional.pixel_unshuffle(x, patch).to(self.actor.weight.dtype, memory_format=layout)
         for i, layer in enumerate(self.conv):
-            # Pixels are 0 to 255; the first weight is divided instead of the pixels.
+            # The weights of the first layer are divided by 255 instead of the pixels.
             weight = layer.weight / 255.0 if i == 0 else layer.weight
             x = functional.gelu(functional.conv2d(x, weight, layer.bias, layer.stride, layer.padding))
         return x.unflatten(0, (pixels.shape[1], -1))
 
 
-_TYPES = {"F32": torch.float32, "BF16": torch.bfloat16, "I64": torch.int64}  # types of safetensors
+_TYPES = {"F32": torch.float32, "BF16": torch.bfloat16, "I64": torch.int64}  # element types in safetensors files
 _NO_HASH = b"0" * 16
 
 
 def _seal(data: bytearray, header_end: int, saved: str) -> None:
-    """Writes the hash of changed safetensors: of the whole file with zeros for the digits of the hash."""
+    """Updates the hash in a changed safetensors file: the hash of the whole file, with zeros as digits of the hash."""
     place = data.find(f'"hash":"{saved}"'.encode(), 8, header_end) + len('"hash":"')
     data[place : place + len(_NO_HASH)] = _NO_HASH
     data[place : place + len(_NO_HASH)] = f"{_hash64(bytes(data)):016x}".encode()
@@ -351,7 +358,7 @@ def _policy_of(config_toml: str, tensors: dict[str, Tensor], metadata: Mapping[s
     except (tomllib.TOMLDecodeError, KeyError) as error:
         raise pictura.Error(f"{path}: expected the training configuration, with a table 'policy': {error}") from error
     queries = tensors.get("attention.queries")
-    # Allocates no memory: if the system overcommits memory, the sizes in a broken file could exhaust it.
+    # The device "meta" allocates no memory. Otherwise wrong sizes in a broken file could exhaust the memory.
     with torch.device("meta"):
         policy = Policy(config, 0 if queries is None else len(queries), "walls.hidden.weight" in tensors)
     weights = {name: tensor.to(torch.float32) if tensor.is_floating_point() else tensor for name, tensor in tensors.items()}
@@ -364,7 +371,7 @@ def _policy_of(config_toml: str, tensors: dict[str, Tensor], metadata: Mapping[s
 
 @contextlib.contextmanager
 def _named(path: str) -> Iterator[None]:
-    """Converts any other error that a broken file causes to a pictura.Error that names the file."""
+    """Converts any exception that a broken file causes to a pictura.Error, which names the file."""
     try:
         yield
     except (pictura.Error, OSError):
@@ -378,10 +385,10 @@ def load_policy(path: str | os.PathLike[str], average: bool = False) -> Policy:
 
     Args:
         path: The file.
-        average: Whether to take the average of weights that a checkpoint of a run with train.weight_average holds.
+        average: Whether to read the average of weights, which checkpoints contain if train.weight_average was set.
 
-    Raises pictura.Error naming what is wrong with the file, pictura.UsageError for a backbone that is a separate
-    program.
+    Raises pictura.Error, which describes the fault of the file, and pictura.UsageError if the policy's backbone is a
+    separate program.
 
     Examples:
         >>> from pictura.torch import load_policy
@@ -416,15 +423,15 @@ def _load(path: str, average: bool) -> Policy:
 
 
 def save_policy(policy: Policy, path: str | os.PathLike[str], like: str | os.PathLike[str]) -> None:
-    """Writes a policy's weights instead of those of a checkpoint (.ckpt) or safetensors of the same architecture.
+    """Writes a copy of a checkpoint (.ckpt) or safetensors file with the weights of a policy of the same architecture.
 
-    Everything else in the file stays, the type of its numbers too, so that the `pictura` command takes it. The file is
-    written whole or not at all.
+    Everything else is copied from the file `like`, and the types of its numbers are kept. So the `pictura` command can
+    read the new file. The file is written completely or not at all.
 
     Args:
-        policy: Whose weights are written.
+        policy: Policy with the weights to write.
         path: The new file.
-        like: The file that has everything else.
+        like: The file to copy.
 
     Raises:
         pictura.Error: The architectures differ, or `like` is damaged.
@@ -470,7 +477,7 @@ def _write_whole(path: str, data: bytes | bytearray) -> None:
 
 
 class _PolicyOfArrays(nn.Module):
-    """Policy whose arguments are the arrays of an observation, one after the other."""
+    """Policy whose arguments are the arrays of an observation, instead of a dict."""
 
     def __init__(self, policy: Policy, images: list[str]) -> None:
         super().__init__()
@@ -485,7 +492,8 @@ class _PolicyOfArrays(nn.Module):
 
 
 def _example_observation(policy: Policy) -> dict[str, Tensor]:
-    """Returns two rows of zeros for each array that a policy reads; images of several sizes are rgb_0, rgb_1, ..."""
+    """Returns zeros of batch size 2 for each array that a policy reads. Images of several sizes are rgb_0, rgb_1,
+    ..."""
     types = {"f32": torch.float32, "i32": torch.int32}
     known = {name: (types[kind], (rows, numbers) if rows > 1 else (numbers,)) for name, kind, rows, numbers in pictura.OBSERVATION_ARRAYS}
     example = {name: torch.zeros(2, *known[name][1], dtype=known[name][0]) for name in policy.observation_names if name != "rgb"}
@@ -500,21 +508,20 @@ def _example_observation(policy: Policy) -> dict[str, Tensor]:
 
 
 def export_onnx(policy: Policy, path: str | os.PathLike[str]) -> None:
-    """Writes a policy as an ONNX model of opset 20, with torch's exporter, which needs the packages onnx and
-    onnxscript.
+    """Writes a policy as an ONNX model of opset 20. Needs the packages onnx and onnxscript.
 
-    Inputs are the arrays of an observation by their names, as Policy reads them, [batch, ...] of any batch; images of
+    The model's inputs are the arrays that Policy reads, [batch, ...] of any batch size, with their names. Images of
     cameras of several sizes are rgb_0, rgb_1, ... Outputs are `logits` float32 [batch, 12] and `value` float32 [batch].
-    The property `pictura` of the model is JSON of what the policy's file says beside its weights, without the path. The
-    file is written whole or not at all.
+    The model's property `pictura` contains the policy's metadata without the path, as JSON. The file is written
+    completely or not at all.
 
     Args:
         policy: The policy.
-        path: The file.
+        path: The new file.
 
     Raises:
         pictura.Error: A package is missing.
-        pictura.UsageError: The policy reads images and is of no file, which would say their size.
+        pictura.UsageError: The policy reads images, and was not loaded from a file, so their size is unknown.
 
     Examples:
         >>> from pictura.torch import export_onnx, load_policy
@@ -528,7 +535,7 @@ def export_onnx(policy: Policy, path: str | os.PathLike[str]) -> None:
     module = _PolicyOfArrays(copy.deepcopy(policy).cpu(), images).eval()
     batch = torch.export.Dim("batch")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # warnings about the exporter's own code
+        warnings.simplefilter("ignore")  # the exporter warns about its own code
         program = torch.onnx.export(
             module,
             tuple(example.values()),

@@ -1,13 +1,13 @@
-"""Environments over pictura.Simulator with the interfaces of Gymnasium, PettingZoo, TorchRL and PufferLib.
+"""Environments based on pictura.Simulator, with the interfaces of Gymnasium, PettingZoo, TorchRL and PufferLib.
 
-Each environment needs the library of its interface; pictura.envs.batch needs none.
+Each environment needs the library that defines its interface. pictura.envs.batch and DrivePufferEnv need no library.
 """
 
 from pictura.envs.batch import Batch  # noqa: F401
 
 
 def register() -> None:
-    """Registers pictura/Drive-v0 and pictura/Log-v0 with Gymnasium, as `import pictura` does if Gymnasium is
+    """Registers pictura/Drive-v0 and pictura/Log-v0 with Gymnasium. `import pictura` calls this if Gymnasium is
     installed."""
     from gymnasium.envs.registration import register as register_with_gymnasium
     from gymnasium.envs.registration import registry

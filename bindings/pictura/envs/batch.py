@@ -1,4 +1,4 @@
-"""Common base of all environments: a simulator, its renderer, and observations, actions and results of each slot."""
+"""Common base of all environments: a simulator, its renderer, and the observations, actions and results of slots."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ OBSERVATIONS = ("vector", "flat", "images", "both")
 ACTIONS = ("discrete", "multi_discrete")
 # Arrays of the vector observation, in the order of "flat".
 VECTOR_KEYS = ("ego", "partners", "lanes", "boundaries", "controls", "walls", "conditioning", "waypoints")
-# Jerks in m/s^3 of action 3 i + k, or (i, k): LONGITUDINAL_JERKS_MPS3[i] and LATERAL_JERKS_MPS3[k], left positive. A test
-# measures that the simulator's are the same.
+# Action 3 i + k, or (i, k), has the longitudinal jerk LONGITUDINAL_JERKS_MPS3[i] and the lateral jerk
+# LATERAL_JERKS_MPS3[k] in m/s^3; left is positive. A test checks these jerks against the simulator.
 LONGITUDINAL_JERKS_MPS3, LATERAL_JERKS_MPS3 = (-15.0, -4.0, 0.0, 4.0), (-4.0, 0.0, 4.0)
 NUM_LONGITUDINAL, NUM_LATERAL = len(LONGITUDINAL_JERKS_MPS3), len(LATERAL_JERKS_MPS3)
 STATUS_ACTIVE = 0
-# "human": a page in the browser, from the first reset on.
+# "human" opens a live page in the browser at the first reset.
 RENDER_MODES = ["rgb_array", "human"]
 
 
 def load_maps(maps: str | pictura.Map | Sequence[str | pictura.Map]) -> list[pictura.Map]:
-    """Returns maps from one or several names or pictura.Map. Raises pictura.UsageError for none."""
+    """Returns a list of maps from one or several names or pictura.Map. Raises pictura.UsageError for an empty list."""
     if isinstance(maps, (str, pictura.Map)):
         maps = [maps]
     if not isinstance(maps, Sequence) or not maps:
@@ -37,7 +37,7 @@ def load_maps(maps: str | pictura.Map | Sequence[str | pictura.Map]) -> list[pic
 
 
 def refuse_unknown(options: Mapping[str, Any], *makers: Callable[..., Any]) -> None:
-    """Raises pictura.UsageError for an option of neither these functions nor simulators."""
+    """Raises pictura.UsageError for an option that neither these functions nor pictura.Simulator have."""
     signature = (pictura.Simulator.__init__.__doc__ or "").split("->")[0]
     known = set(re.findall(r"(\w+): ", signature)) - {"worlds"}
     known = known.union(*(inspect.signature(maker).parameters for maker in makers)) - {"self", "options"}
@@ -49,27 +49,27 @@ def refuse_unknown(options: Mapping[str, Any], *makers: Callable[..., Any]) -> N
 
 
 class Batch:
-    """Simulator whose slots are agents to be trained, with images if they are observed.
+    """Simulator whose agents are trained, with a renderer if images are observed. Each agent has one slot.
 
     Args:
-        maps: Names or pictura.Map, one or several, taken in turn by the worlds.
-        num_agents: Agents of each world.
-        num_worlds: Independent copies of the simulation.
-        worlds: (index of the map, agents, global world) of each world, as pictura.draw_worlds() draws them, in place of
-            num_agents and num_worlds.
-        observation: "vector", a dict of entity sets; "flat", the same as one float32 [slots, n]; "images", uint8 rgb
-            with ego, conditioning and waypoints; or "both".
+        maps: One or several maps, as names or pictura.Map. World i uses maps[i % len(maps)].
+        num_agents: Number of agents in each world.
+        num_worlds: Number of worlds: independent copies of the simulation.
+        worlds: (index of the map, number of agents, global world) of each world, as pictura.draw_worlds() returns them.
+            Replaces num_agents and num_worlds.
+        observation: "vector", a dict of entity sets; "flat", the same numbers as one array float32 [slots, n];
+            "images", a dict of uint8 rgb, ego, conditioning and waypoints; or "both", "vector" and "images" together.
         actions: "discrete", Discrete(12), or "multi_discrete", MultiDiscrete([longitudinal 4, lateral 3]).
-        seed: Seed of all random numbers until the first reset with another one.
+        seed: Seed of all random numbers until a reset with another seed.
         device: "cpu", "cuda" or "cuda:INDEX".
         array: "numpy", or "torch" for tensors over the simulator's memory; None: "numpy" on the CPU, "torch" on CUDA.
-        rig: Cameras of the images; None: the paper's four of 96x54 px.
+        rig: Cameras of the images; None: the paper's four cameras, 96x54 px each.
         renderer: "auto", or one of pictura.renderer_names().
-        num_threads: Threads of the host; 0: all.
-        options: Others of pictura.Simulator, as episode_steps, parked_cars or conditioning.
+        num_threads: Number of CPU threads; 0: all.
+        options: Other arguments of pictura.Simulator, such as episode_steps, parked_cars or conditioning.
 
     Raises:
-        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
+        pictura.UsageError: An option does not exist or has an invalid value.
 
     Examples:
         >>> from pictura.envs import Batch
@@ -147,7 +147,7 @@ class Batch:
             self._action_memory = np.full(self.num_slots, pictura.IDLE_ACTION, np.int32)
 
     def view(self, lent: pictura.Array) -> Any:
-        """Returns a NumPy array or torch tensor over memory of the library."""
+        """Returns a NumPy array or torch tensor that shares memory with an array of the library."""
         if self.array == "numpy":
             return lent.numpy()
         return self._torch_of(lent)
@@ -161,8 +161,10 @@ class Batch:
     # Observations
 
     def observe(self, copy: bool = True) -> Any:
-        """Returns the present observation of every slot: an array or a dict of arrays [slots, ...]. They are views of
-        the simulator's memory unless copied, except "flat", which is always a copy."""
+        """Returns the current observation of every slot: an array or a dict of arrays [slots, ...].
+
+        Without `copy` the arrays are views of the simulator's memory. "flat" is always a copy.
+        """
         if self.observation == "flat":
             rows = [self._own[key].reshape(self.num_slots, -1) for key in self._flat_keys]
             return np.concatenate(rows, axis=1) if self.array == "numpy" else self._torch.cat(rows, dim=1)
@@ -177,7 +179,8 @@ class Batch:
         return {key: self.copied(value) for key, value in seen.items()} if copy else seen
 
     def shapes(self) -> dict[str, tuple[tuple[int, ...], str]] | tuple[tuple[int, ...], str]:
-        """Returns (shape, NumPy's name of the type) of one slot's observation, by name, or a single pair for "flat"."""
+        """Returns (shape, NumPy's name of the type) of each array of one slot's observation; a single pair for
+        "flat"."""
         if self.observation == "flat":
             return (sum(int(np.prod(self._own[key].shape[1:])) for key in self._flat_keys),), "float32"
         keys = self._own if self.observation in ("vector", "both") else ("ego", "conditioning", "waypoints")
@@ -212,9 +215,9 @@ class Batch:
             fits = (longitudinal >= 0) & (longitudinal < NUM_LONGITUDINAL) & (lateral >= 0) & (lateral < NUM_LATERAL)
             if self.array == "numpy" and not fits.all():
                 raise pictura.Error("actions: expected [longitudinal in [0, 4), lateral in [0, 3)]")
-            # On a device the simulator detects the -1, without making the host wait here.
+            # On CUDA -1 marks invalid actions. The simulator reports them later, so the host does not wait here.
             actions = library.where(fits, longitudinal * NUM_LATERAL + lateral, -1)
-        elif actions.dtype.itemsize > 4:  # values out of range must not wrap into the range
+        elif actions.dtype.itemsize > 4:  # conversion to int32 must not wrap other values into the range
             whole = actions.long() if self.array == "torch" else actions.astype(np.int64, copy=False)
             actions = whole.clip(-(2**31), 2**31 - 1)
         self._action_memory[:] = actions
@@ -223,11 +226,11 @@ class Batch:
     # Steps
 
     def reset(self, seed: int | None = None, world_mask: Any = None) -> None:
-        """Starts new episodes in all worlds, or in those of the mask, with `seed`, or with the simulator's own."""
+        """Starts new episodes in all worlds, or in the worlds of the mask. seed: None: the simulator's seed."""
         self.simulator.reset(world_mask, seed)
 
     def step(self, actions: Any) -> dict[str, Any]:
-        """Takes one step. Returns its results by name, as views that the next step overwrites."""
+        """Advances the simulator by one step. Returns its results by name, as views that the next step overwrites."""
         result = self.simulator.step(self.action_indices(actions))
         return self.results(result)
 
@@ -239,12 +242,14 @@ class Batch:
 
     @property
     def active(self) -> Any:
-        """bool [slots]: agents that drive now; the others have halted or are absent, and their actions are ignored."""
+        """bool [slots]: whether the agent is driving. Actions of other agents (halted or absent) are ignored."""
         return self._state["status"] == STATUS_ACTIVE
 
     def info(self, copy: bool = True) -> dict[str, Any]:
-        """Returns the infos of every slot after a step, by name; docs/reference/environment.md lists them. They are
-        views of the simulator's memory unless copied, except "active"."""
+        """Returns the infos of every slot after a step, by name. docs/reference/environment.md lists them.
+
+        Without `copy` the arrays except "active" are views of the simulator's memory.
+        """
         results = self._result_views
         names = ("events", "halt_reason", "goals_reached", "waypoints_reached", "episode_return", "agent_class")
         info = {name: self._state[name] for name in names}
@@ -254,12 +259,14 @@ class Batch:
         return {"active": self.active} | info
 
     def draw(self, world: int = 0, agent: int = 0, width_px: int = 640, height_px: int = 480) -> np.ndarray:
-        """Draws the surroundings of an agent of a world from above, uint8 [height, width, 3]; on the CPU."""
+        """Draws an agent's surroundings from above, uint8 [height, width, 3]. The simulator must be on the CPU."""
         return self.simulator.draw(world, agent, width_px=width_px, height_px=height_px)
 
     def show(self, agent: int = 0) -> None:
-        """Opens a page in the browser that shows the only world from now on, and prints its address on stderr; steps
-        then take real time. On the CPU."""
+        """Opens a live page of the only world in the browser, and prints its address to stderr.
+
+        While the page is open, steps run in real time. The simulator must be on the CPU.
+        """
         if self.live is None:
             rig = self.renderer.rig if self.renderer is not None else None
             self.live = pictura.LiveView(self.simulator, follow=agent, rig=rig, wait_for_page=False)
@@ -274,16 +281,16 @@ class Batch:
 
 
 def checked_render_mode(mode: str | None) -> str | None:
-    """Raises pictura.UsageError for render modes that environments of one world do not support."""
+    """Raises pictura.UsageError for a render mode that single-world environments do not support."""
     if mode not in (None, *RENDER_MODES):
         raise pictura.UsageError(f"render_mode: expected None, {' or '.join(map(repr, RENDER_MODES))}, got {mode!r}")
     return mode
 
 
 class OtherDrivers:
-    """Drivers of the agents that a user does not drive: a controller or its name, or a function of observations.
+    """Driver of the agents that the user does not control: a controller, its name, or a function.
 
-    A function takes the dict of all slots' observations and returns int32 [slots].
+    The function takes the dict of the observations of all slots, and returns actions int32 [slots].
     """
 
     def __init__(self, who: str | pictura.Controller | Callable[[Mapping[str, Any]], Any], batch: Batch, seed: int) -> None:
@@ -292,7 +299,7 @@ class OtherDrivers:
         self._controller = pictura.Controller(who, batch.simulator, seed) if isinstance(who, str) else who
 
     def step(self, slot: int, action: int) -> dict[str, Any]:
-        """Takes one step in which the agent of `slot` does `action` and the others are driven."""
+        """Advances the simulator by one step. The agent of `slot` executes `action`; the driver controls the others."""
         batch = self._batch
         if self._policy is not None:
             actions = np.array(self._policy(batch.observe(copy=False)), np.int32)

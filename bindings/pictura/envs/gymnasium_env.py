@@ -1,4 +1,4 @@
-"""Gymnasium environment of one agent among others: gymnasium.make("pictura/Drive-v0")."""
+"""Gymnasium environments that control one agent among others: pictura/Drive-v0 and pictura/Log-v0."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ from pictura.envs.gymnasium_spaces import action_space, observation_space
 
 
 class DriveEnv(gymnasium.Env):
-    """One vehicle of a world among others: gymnasium.make("pictura/Drive-v0").
+    """Environment that controls one vehicle among other agents: gymnasium.make("pictura/Drive-v0").
 
-    An episode ends when the agent's infraction halts it (terminated) or when its world's does (truncated). It runs on
-    the CPU.
+    The episode is terminated when an infraction halts the vehicle. It is truncated when the world's episode ends. The
+    simulator runs on the CPU.
 
     Args:
-        maps: A name or a pictura.Map.
-        num_agents: Agents of the world, the vehicle included.
-        others: What drives the others: "lane" keeps lanes, "idle" stands, "random" acts at random; or a policy, a
-            function from the observations of all slots, [slots, ...] by name, to actions int32 [slots].
+        maps: One map, as name or pictura.Map.
+        num_agents: Number of agents in the world, including the vehicle.
+        others: Driver of the other agents: "lane" follows lanes, "idle" always takes the idle action, "random" takes
+            random actions. Or a function that maps the observations of all slots, a dict of arrays [slots, ...], to
+            actions int32 [slots].
         render_mode: None; "rgb_array", the vehicle's surroundings from above, uint8 [height, width, 3]; or "human", a
-            live page in the browser from the first reset on.
-        num_threads: Threads of the host; 1, so that processes can be forked.
-        options: Those of pictura.envs.Batch, and through it of pictura.Simulator.
+            live page in the browser, which the first reset opens.
+        num_threads: Number of CPU threads. With the default 1, processes can be forked.
+        options: Arguments of pictura.envs.Batch and of pictura.Simulator.
 
     Raises:
-        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
-        pictura.Error: step() with an action outside of the space; reset() where no vehicle finds a place.
+        pictura.UsageError: An option does not exist or has an invalid value.
+        pictura.Error: step() with an action outside the action space; reset() if no vehicle finds a place.
 
     Examples:
         >>> import gymnasium
@@ -75,8 +76,8 @@ class DriveEnv(gymnasium.Env):
         raise pictura.Error("reset: no vehicle found a place in 100 episodes: expected a map or options with more room")
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """One step in which the agent does `action` and the others what they do. Returns (observation, reward,
-        terminated, truncated, info). Raises pictura.Error for an action outside of the space."""
+        """Advances the world by one step with `action` of the agent. Returns (observation, reward, terminated,
+        truncated, info). Raises pictura.Error for an action outside the action space."""
         if not self.action_space.contains(action):
             raise pictura.Error(f"step: expected an action of {self.action_space}, got {action!r}")
         if self.batch.actions == "multi_discrete":
@@ -92,7 +93,7 @@ class DriveEnv(gymnasium.Env):
         self.batch.close()
 
     def _drivers(self) -> np.ndarray:
-        """Returns the slots that may be the agent of the new episode."""
+        """Returns the slots from which the controlled agent of the new episode is chosen."""
         return np.flatnonzero(self.batch.active & (self.batch._state["agent_class"] == 0))
 
     def _observation(self) -> Any:
@@ -106,21 +107,21 @@ class DriveEnv(gymnasium.Env):
 
 
 class LogEnv(DriveEnv):
-    """One road user of a recorded scene: gymnasium.make("pictura/Log-v0", scene=...).
+    """Environment that controls one road user of a recorded scene: gymnasium.make("pictura/Log-v0", scene=...).
 
-    Its goal is where its record ends. Before the first action it is as recorded.
+    The road user's goal is the end of its recorded track. Until the first action, its state is the recorded state.
 
     Args:
-        scene: A name as pictura.Scenario.load() takes it, or a pictura.Scenario.
+        scene: A name for pictura.Scenario.load(), or a pictura.Scenario.
         start_step: Step of the recording at which episodes begin.
-        control: Words that pictura.Scenario.mask() takes; the first road user that they name is the agent.
-        others: "log", as recorded; or vehicles by the intelligent driver model along their recorded paths, "idm", or
-            along lanes, "idm_lanes".
-        options: Those of DriveEnv.
+        control: Words for pictura.Scenario.mask(). The first road user that they select is controlled.
+        others: "log": other road users follow their recorded tracks. "idm": other vehicles follow the intelligent
+            driver model along their recorded paths; "idm_lanes": along lanes.
+        options: Arguments of DriveEnv.
 
     Raises:
-        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
-        pictura.Error: Names file and field of a scene that cannot be read.
+        pictura.UsageError: An option does not exist or has an invalid value.
+        pictura.Error: The scene cannot be read; the message names file and field.
 
     Examples:
         >>> import gymnasium

@@ -1,4 +1,4 @@
-"""Gymnasium vector environment of all agents: the "environment" axis is the simulator's slots."""
+"""Gymnasium vector environment of all agents: each slot of the simulator is one sub-environment."""
 
 from __future__ import annotations
 
@@ -15,27 +15,28 @@ from pictura.envs.gymnasium_spaces import action_space, observation_space
 
 
 class DriveVectorEnv(gymnasium.vector.VectorEnv):
-    """All agents of all worlds: the axis of environments is that of agents, "slots".
+    """Vector environment of all agents of all worlds. Each agent has one slot, and each slot is one sub-environment.
 
-    A slot whose agent has halted reports `terminated` once, then reward 0 and info["active"] false until its world
-    resets: agents of a world begin together. On roads that end, a slot whose agent leaves reports `truncated` with that
-    agent's last observation, and waits, not active, until another agent enters. Learn from the transitions where
-    info["valid"] is true. docs/reference/environment.md describes observations, actions, rewards, ends and infos.
+    All agents of a world begin their episodes together. When an agent halts, its slot reports `terminated` once. Then
+    it reports reward 0 and info["active"] false until the world resets. When an agent leaves by a road that ends, its
+    slot reports `truncated` with the agent's last observation. Then the slot is inactive until another agent enters.
+    Learn from the transitions where info["valid"] is true. docs/reference/environment.md describes observations,
+    actions, rewards, episode ends and infos.
 
     Args:
-        maps: Names or pictura.Map, one or several, taken in turn by the worlds.
-        num_agents: Agents of each world.
-        num_worlds: Independent copies of the simulation.
-        num_envs: Slots that there must be, a multiple of num_agents, in place of num_worlds.
-        autoreset: "next_step": the step after a world's end begins its next episode, with rewards of 0. "same_step":
-            the step that ends an episode begins the next one, and info["final_obs"] and info["final_info"] have, for
-            the slots that ended in that step, what was last observed.
-        render_mode: None or "rgb_array", the first world from above.
-        copy: Whether calls return copies. Without, they return views that the next step overwrites.
-        options: Those of pictura.envs.Batch, and through it of pictura.Simulator.
+        maps: One or several maps, as names or pictura.Map. World i uses maps[i % len(maps)].
+        num_agents: Number of agents in each world.
+        num_worlds: Number of worlds: independent copies of the simulation.
+        num_envs: Number of slots, a multiple of num_agents. Replaces num_worlds.
+        autoreset: "next_step": the step after the end of a world's episode begins the next episode, with reward 0.
+            "same_step": the step that ends an episode begins the next episode. Then info["final_obs"] and
+            info["final_info"] contain the last observations and infos of the slots that ended in this step.
+        render_mode: None, or "rgb_array", the first world from above.
+        copy: Whether calls return copies. If false, they return views that the next step overwrites.
+        options: Arguments of pictura.envs.Batch and of pictura.Simulator.
 
     Raises:
-        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
+        pictura.UsageError: An option does not exist or has an invalid value.
         gymnasium.error.ResetNeeded: step() before the first reset().
 
     Examples:
@@ -84,7 +85,7 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
         self._has_begun = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Starts new episodes in all worlds: of `seed`, or of the next one that this environment draws. Returns
+        """Starts new episodes in all worlds with `seed`, or with the next seed that this environment draws. Returns
         (observations, infos)."""
         super().reset(seed=seed)
         self._has_begun = True
@@ -92,8 +93,8 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
         return self.batch.observe(self._copy), self._info(self._copy)
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
-        """Advances every world by one step. actions: int [slots] in [0, 12), or [slots, 2] with "multi_discrete"; those
-        of slots that are not active are ignored. Returns (observations, rewards float32 [slots], terminated bool
+        """Advances every world by one step. actions: int [slots] in [0, 12), or [slots, 2] with "multi_discrete".
+        Actions of inactive slots are ignored. Returns (observations, rewards float32 [slots], terminated bool
         [slots], truncated bool [slots], infos). Raises pictura.Error for other shapes and numbers."""
         if not self._has_begun:
             raise gymnasium.error.ResetNeeded("step: expected reset() before the first step")
@@ -128,12 +129,13 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
 
 
 class AgentStatistics(gymnasium.vector.VectorWrapper):
-    """Counts the agents' events like the simulator's totals: `statistics`, a dict of numbers since construction.
+    """Wrapper that counts agents' events, like pictura.Simulator.totals(), in the dict `statistics`.
 
-    Steps of halted agents are not counted. Counts equal pictura.Simulator.totals(); sums equal them up to rounding.
+    Counting begins at construction. Steps of halted agents are not counted. Counts equal the simulator's totals, and
+    sums equal them up to rounding.
 
     Args:
-        env: Whose steps are counted.
+        env: Environment whose steps are counted.
 
     Examples:
         >>> from pictura.envs.gymnasium_vector import AgentStatistics

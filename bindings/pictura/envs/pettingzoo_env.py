@@ -1,4 +1,4 @@
-"""PettingZoo ParallelEnv of the agents of one world."""
+"""PettingZoo ParallelEnv with all agents of one world."""
 
 from __future__ import annotations
 
@@ -13,21 +13,23 @@ from pictura.envs.gymnasium_spaces import action_space, observation_space
 
 
 class DriveParallelEnv(ParallelEnv):
-    """agent_0, agent_1, ...: those that found a place and still drive are `agents`. An infraction terminates an agent,
-    the end of the world's episode truncates all that are left, and so does leaving a road that ends. An agent that
-    enters such a road instead of agent_3 is agent_3_1, the next one agent_3_2; possible_agents has the first ones
-    alone. infos have what pictura.envs.Batch.info() lists; "active" is whether the agent goes on. It runs on the CPU.
+    """Parallel environment of the agents agent_0, agent_1, ... of one world.
+
+    `agents` lists the agents that are present and driving. An infraction terminates an agent. The end of the world's
+    episode truncates all remaining agents, and leaving by a road that ends truncates an agent. If agent_3 leaves, the
+    next agent in its slot is agent_3_1, then agent_3_2. possible_agents lists only agent_0, agent_1, ... infos have the
+    names of pictura.envs.Batch.info(); "active" is whether the agent continues to drive. The simulator runs on the CPU.
 
     Args:
-        maps: A name or a pictura.Map.
-        num_agents: Agents of the world.
-        render_mode: None; "rgb_array", from above; or "human", a live page in the browser.
-        num_threads: Threads of the host.
-        options: Those of pictura.envs.Batch, and through it of pictura.Simulator.
+        maps: One map, as name or pictura.Map.
+        num_agents: Number of agents in the world.
+        render_mode: None; "rgb_array", the world from above; or "human", a live page in the browser.
+        num_threads: Number of CPU threads.
+        options: Arguments of pictura.envs.Batch and of pictura.Simulator.
 
     Raises:
-        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
-        pictura.Error: step() without an action of a live agent.
+        pictura.UsageError: An option does not exist or has an invalid value.
+        pictura.Error: step() without an action for a live agent.
 
     Examples:
         >>> from pictura.envs.pettingzoo_env import DriveParallelEnv
@@ -79,9 +81,11 @@ class DriveParallelEnv(ParallelEnv):
         raise pictura.Error("reset: no agent found a place in 100 episodes: expected a map or options with more room")
 
     def step(self, actions: dict[str, Any]) -> tuple[dict, dict, dict, dict, dict]:
-        """One step. actions: one of every live agent by name. Returns (observations, rewards, terminations,
-        truncations, infos) of the agents that acted, and of those that entered. Raises pictura.Error where an agent has
-        no action."""
+        """Advances the world by one step. actions: the action of every live agent, by name.
+
+        Returns (observations, rewards, terminations, truncations, infos) of the agents that acted or entered. Raises
+        pictura.Error if the action of a live agent is missing.
+        """
         acting = self.agents
         missing = [agent for agent in acting if agent not in actions]
         if missing:

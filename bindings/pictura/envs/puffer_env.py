@@ -1,4 +1,4 @@
-"""PufferEnv of PufferLib 3, which also works without PufferLib."""
+"""Environment with PufferLib 3's interface PufferEnv. It also works without PufferLib."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ try:
 except ImportError:
 
     class _Base:  # type: ignore[no-redef]
-        """PufferEnv's treatment of buffers, for use without PufferLib."""
+        """Base class that allocates buffers as PufferEnv does, for use without PufferLib."""
 
         def __init__(self, buf: dict[str, Any] | None = None) -> None:
             space, n = self.single_observation_space, self.num_agents
@@ -31,19 +31,21 @@ except ImportError:
 
 
 class DrivePufferEnv(_Base):
-    """All agents of some worlds, written into the buffers that PufferLib gives. Observations are flat or, with
-    observation="images", one image per camera: PufferLib takes a single Box. `masks` is false for the halted.
+    """Environment of all agents of one or many worlds, which writes its results into PufferLib's buffers.
+
+    PufferLib needs observations in a single Box: the flat observation, or with observation="images" one image per
+    camera. `masks` is false for inactive agents.
 
     Args:
-        maps: Names or pictura.Map, one or several, taken in turn by the worlds.
-        num_agents: Agents of each world.
-        num_worlds: Independent copies of the simulation.
-        buf: PufferLib's buffers by name; None: arrays of its own.
-        seed: Seed of all random numbers until the first reset with another one.
-        options: Those of pictura.envs.Batch, and through it of pictura.Simulator.
+        maps: One or several maps, as names or pictura.Map. World i uses maps[i % len(maps)].
+        num_agents: Number of agents in each world.
+        num_worlds: Number of worlds: independent copies of the simulation.
+        buf: PufferLib's buffers by name; None: the environment allocates buffers.
+        seed: Seed of all random numbers until a reset with another seed.
+        options: Arguments of pictura.envs.Batch and of pictura.Simulator.
 
     Raises:
-        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
+        pictura.UsageError: An option does not exist or has an invalid value.
 
     Examples:
         >>> from pictura.envs.puffer_env import DrivePufferEnv
@@ -70,7 +72,7 @@ class DrivePufferEnv(_Base):
 
     @property
     def done(self) -> bool:
-        """False, since worlds reset themselves."""
+        """False, because worlds reset themselves."""
         return False
 
     def reset(self, seed: int | None = None) -> tuple[np.ndarray, list[dict[str, float]]]:
@@ -83,8 +85,9 @@ class DrivePufferEnv(_Base):
         return self.observations, []
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[dict[str, float]]]:
-        """One step. Returns the buffers of observations, rewards, terminals and truncations, and a list that is empty
-        or has a dict of means over the agents' episodes that ended since the last one."""
+        """Advances every world by one step. Returns the buffers of observations, rewards, terminals and truncations,
+        and a list of logs. The list is empty or has one dict of means over the agents' episodes that ended since the
+        last dict."""
         results = self.batch.step(actions)
         self.actions[:] = actions
         self.rewards[:] = results["reward"]
@@ -106,7 +109,8 @@ class DrivePufferEnv(_Base):
         self.masks[:] = self.batch.active
 
     def _log(self) -> dict[str, float]:
-        """Returns means over the agents' episodes that ended since the last log, if any did."""
+        """Returns a list with a dict of means over the agents' episodes that ended since the last log, or an empty
+        list."""
         now, before = self.batch.simulator.totals(), self._before
         finished = now["finished_agent_episodes"] - before["finished_agent_episodes"]
         self._before = now

@@ -1,4 +1,4 @@
-"""TorchRL EnvBase: a batch of worlds, each with the same number of agents in the group "agents"."""
+"""TorchRL environment: a batch of worlds, each with the same number of agents in the group "agents"."""
 
 from __future__ import annotations
 
@@ -13,21 +13,23 @@ from pictura.envs.batch import Batch
 
 
 class DriveTorchRLEnv(EnvBase):
-    """batch_size [worlds]. ("agents", "observation", ...), ("agents", "action"), ("agents", "reward") and ("agents",
-    "mask"), which is false for the halted and the absent, are [worlds, agents, ...]; done, terminated and truncated are
-    the worlds', [worlds, 1]. ("agents", "terminated") is true for the agents that an infraction has just ended,
-    ("agents", "truncated") for agents whose world ends or that leave by a road's end: their observation is still their
-    own. reset() takes "_reset" [worlds]. On CUDA nothing is copied to the host.
+    """Batched environment with batch_size [worlds] and the agents of each world in the group "agents".
+
+    ("agents", "observation", ...), ("agents", "action"), ("agents", "reward") and ("agents", "mask") have the shape
+    [worlds, agents, ...]. The mask is false for halted and absent agents. done, terminated and truncated of worlds are
+    [worlds, 1]. ("agents", "terminated") is true in the step in which an infraction halts the agent. ("agents",
+    "truncated") is true in the step in which the world's episode ends or the agent leaves by a road that ends; the
+    agent's observation is then its last one. reset() takes "_reset" [worlds]. On CUDA no data is copied to the host.
 
     Args:
-        maps: Names or pictura.Map, one or several, taken in turn by the worlds.
-        num_agents: Agents of each world.
-        num_worlds: The batch.
+        maps: One or several maps, as names or pictura.Map. World i uses maps[i % len(maps)].
+        num_agents: Number of agents in each world.
+        num_worlds: Number of worlds, the batch size.
         device: "cpu", "cuda" or "cuda:INDEX".
-        options: Those of pictura.envs.Batch, and through it of pictura.Simulator.
+        options: Arguments of pictura.envs.Batch and of pictura.Simulator.
 
     Raises:
-        pictura.UsageError: Names the option that there is not, or the value that it cannot have.
+        pictura.UsageError: An option does not exist or has an invalid value.
 
     Examples:
         >>> from pictura.envs.torchrl_env import DriveTorchRLEnv       # doctest: +SKIP
@@ -108,8 +110,8 @@ class DriveTorchRLEnv(EnvBase):
         agents = self._agents(results)
         agents["reward"] = results["reward"].reshape(*self._shape, 1).clone()
         over = self._over.reshape(*self.batch_size, 1).clone()
-        # A world ends in time, or because too many agents have halted: for agents that still drive both are a
-        # truncation.
+        # A world's episode ends after episode_steps steps, or because too many agents have halted. In both cases the
+        # agents that still drive are truncated.
         ends = {"done": over, "terminated": torch.zeros_like(over), "truncated": over.clone()}
         return TensorDict({"agents": agents, **ends}, self.batch_size, device=self.device)
 
