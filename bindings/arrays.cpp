@@ -397,9 +397,9 @@ void bind_arrays(py::module_& module) {
   py::class_<LentArray>(module, "Array", R"(
 Array in the library's memory, lent without a copy.
 
-NumPy accesses it with `numpy.asarray(array)` if it is on the CPU; `numpy.from_dlpack`, `torch.from_dlpack`, JAX and CuPy access
-it on any device. The memory lives as long as any of these references, even after its simulator or renderer is gone. Its
-contents change with the calls that write it.
+On the CPU, `numpy.asarray(array)` returns a NumPy view. On any device, DLPack gives access: `torch.from_dlpack`,
+`numpy.from_dlpack`, JAX and CuPy. The memory remains allocated while any reference to it exists, even after its
+simulator or renderer is deleted. Later calls of the simulator or renderer change the contents.
 
 Examples:
     >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
@@ -410,7 +410,7 @@ Examples:
     True)")
       .def_property_readonly(
           "shape", [](const LentArray& lent) { return py::tuple(py::cast(values_of(lent.array.shape))); },
-          py::doc("Lengths, a tuple of int."))
+          py::doc("Lengths of the dimensions, a tuple of int."))
       .def_property_readonly(
           "strides", [](const LentArray& lent) { return py::tuple(py::cast(values_of(lent.array.strides))); },
           py::doc("Strides in elements, a tuple of int."))
@@ -423,7 +423,7 @@ Examples:
       .def("numpy", numpy_of, "Returns a NumPy view. Raises TypeError if the array is not on the CPU.")
       .def(
           "torch", [](const py::object& self) { return py::module_::import("torch").attr("from_dlpack")(self); },
-          "Returns a torch tensor over the same memory. Imports torch.")
+          "Returns a torch tensor that shares the memory. Imports torch.")
       .def(
           "__array__",
           [](const py::object& self, const py::object& dtype, const py::object& copy) -> py::object {
@@ -439,8 +439,8 @@ Examples:
           py::arg("dtype") = py::none(), py::arg("copy") = py::none())
       .def("__dlpack__", dlpack_of, py::kw_only(), py::arg("stream") = py::none(), py::arg("max_version") = py::none(),
            py::arg("dl_device") = py::none(), py::arg("copy") = py::none(),
-           "DLPack's protocol, versioned if max_version is (1, 0) or later. Raises BufferError if the array cannot be "
-           "lent.")
+           "Returns a DLPack capsule, versioned if max_version is (1, 0) or later. Raises BufferError if the array "
+           "cannot be exported.")
       .def(
           "__dlpack_device__",
           [](const LentArray& lent) {

@@ -54,7 +54,8 @@ void define_controller(py::class_<PyController>* controller) {
       .def(py::init([](const std::string& name, const PySimulator& simulator, uint64_t seed) {
              return std::make_unique<PyController>(controller_by_name(name, simulator, seed));
            }),
-           py::arg("name"), py::arg("simulator"), py::arg("seed") = 0, "Raises pictura.UsageError listing the names.")
+           py::arg("name"), py::arg("simulator"), py::arg("seed") = 0,
+           "Raises pictura.UsageError, which lists the valid names, if `name` is unknown.")
       .def_static(
           "_of", [](const ControllerInside& inside) { return std::make_unique<PyController>(inside); },
           py::arg("inside"))
@@ -64,11 +65,11 @@ void define_controller(py::class_<PyController>* controller) {
             return std::make_unique<PyController>(shared_controller(drivers, simulator));
           },
           py::arg("drivers"), py::arg("simulator"),
-          R"(Returns a controller of several drivers that share a simulator's slots, of (controller, mask): if two command a slot, the later
-one drives.
+          R"(Returns a controller that combines several controllers, each for some of a simulator's slots.
 
-mask: uint8 or bool [slots] in the simulator's memory, which is read at every step; None: all slots. Raises pictura.Error for
-another array and for a controller of another simulator.)")
+drivers: pairs (controller, mask). If two controllers command the same slot, the later one in the list drives.
+mask: uint8 or bool [slots] in the simulator's memory, which every step reads; None: all slots.
+Raises pictura.Error for a mask of another shape, type or device, and for a controller of another simulator.)")
       .def_property_readonly("name", &PyController::name)
       .def(
           "act",
@@ -77,8 +78,8 @@ another array and for a controller of another simulator.)")
             return self.lent_commands(simulator.stream());
           },
           py::arg("simulator"),
-          R"(Returns commands for all slots, which may be changed before step_commands() executes them: NumPy's COMMAND_DTYPE [slots], or
-uint8 [slots, 28] on CUDA. Every call returns the same memory.)");
+          R"(Returns commands for all slots: a NumPy array of COMMAND_DTYPE [slots], or uint8 [slots, 28] on CUDA. The caller may
+change them before step_commands() executes them. Every call returns the same memory.)");
 }
 
 }  // namespace pictura::python

@@ -183,9 +183,9 @@ Examples:
            py::arg("lines") = py::list(), py::arg("walls") = py::array_t<float>(std::vector<size_t>{0, 7}),
            R"(Creates a custom geometry.
 
-lines: list of (points [n, 3] in metres, width in metres, colour of three numbers in [0, 1]).
-walls: float [n, 7]: both ends of the foot, in metres, and the height.
-Raises pictura.Error for other shapes; renderers reject numbers that are not finite.)")
+lines: list of (points [n, 3] in metres, width in metres, RGB colour with values in [0, 1]).
+walls: float [n, 7]: both ends of a wall on the ground (x, y, z, x, y, z) and its height, in metres.
+Raises pictura.Error for other shapes. Renderers reject numbers that are not finite.)")
       .def_property_readonly(
           "num_strips", [](const Geometry& self) { return self.geometry->strips.size(); },
           py::doc("Number of straight pieces of lines."))
@@ -194,12 +194,12 @@ Raises pictura.Error for other shapes; renderers reject numbers that are not fin
           py::doc("Number of wall faces."))
       .def_property_readonly(
           "num_lights", [](const Geometry& self) { return self.geometry->num_signals; },
-          py::doc("Number of light states of a world with this geometry."));
+          py::doc("Number of traffic light states in each world with this geometry."));
 
   py::class_<Map, std::shared_ptr<Map>>(module, "Map", R"(
-Road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
+Road network: lanes, markings, edges and traffic lights. A map is immutable, so simulators and renderers can share it.
 
-Positions are metres in the map's frame, z up; `origin_m` is the frame's origin in the file's coordinates.
+Positions are in metres in the map's frame, with z up. `origin_m` is the origin of this frame in the file's coordinates.
 
 Examples:
     >>> town = pictura.Map.load('procedural:3')                # or 'Town01', 'city:1', 'mytown.xodr'
@@ -210,22 +210,26 @@ Examples:
       .def_static(
           "load", load_named_map, py::arg("name"), py::kw_only(), py::arg("strict") = false,
           py::arg("chord_error_m") = OpenDriveOptions{}.chord_error_m,
-          R"(Loads a map by name: an OpenDRIVE file (.xodr), a Lanelet2 file (.osm, or .osm@LATITUDE,LONGITUDE in coordinates about
-that place), a town of the map folder, 'procedural:SEED', or 'city:SEED'.
+          R"(Loads or generates a map by name: an OpenDRIVE file (.xodr), a Lanelet2 file (.osm), a town in the folder map_folder(),
+'procedural:SEED', or 'city:SEED'. For FILE.osm@LATITUDE,LONGITUDE this place is the origin of coordinates.
 
-Faults with a single sensible meaning are repaired and listed in `mends`. strict: rejects such faults too. chord_error_m:
-maximum distance of sampled curves from the true curves.
-Raises pictura.Error naming file, line and element; pictura.UsageError if the map does not exist.)")
+Faults of a file that have only one sensible repair are repaired, and listed in `mends`.
+strict: rejects files with such faults instead.
+chord_error_m: maximum distance in metres between a curve and the polyline that approximates it.
+Raises pictura.Error, which names file, line and element, for an invalid file, and pictura.UsageError if the map does
+not exist.)")
       .def_static("from_text", from_text, py::arg("text"), py::arg("source") = "text", py::kw_only(),
                   py::arg("strict") = false,
-                  "Parses the text of an OpenDRIVE file; `source` is its name in messages. Raises as load() does.")
+                  "Parses the text of an OpenDRIVE file. source: name of the text in error messages. Raises the same "
+                  "errors as load().")
       .def_property_readonly(
           "name", [](const Map& self) { return self.road()->name; },
           py::doc("Name of the map: 'Town01', 'procedural:7', or the file's stem."))
-      .def_property_readonly("mends", repairs_of, py::doc("Repaired faults of the file: (kind, repair, message) each."))
+      .def_property_readonly("mends", repairs_of,
+                             py::doc("Repaired faults of the file, a tuple (kind, repair, message) for each."))
       .def_property_readonly(
           "origin_m", [](const Map& self) { return self.road()->origin_m; },
-          py::doc("File coordinates of the map's origin, three floats in metres."))
+          py::doc("The map's origin in the file's coordinates, three floats in metres."))
       .def_property_readonly(
           "geo_reference", [](const Map& self) { return self.road()->geo_reference; },
           py::doc("PROJ string of the file's coordinates; may be empty."))
@@ -234,11 +238,12 @@ Raises pictura.Error naming file, line and element; pictura.UsageError if the ma
           py::doc("Counts and lengths by name, as `pictura map` prints them."))
       .def(
           "arrays", [](const Map& self) { return arrays_of(*self.road()); },
-          R"(Copies the network's geometry to NumPy arrays by name.
+          R"(Returns copies of the network's geometry as NumPy arrays by name. Lengths are in metres.
 
-lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length; lane_point_range int32 [lanes, 2] is each
-lane's range of points. Ranges are half-open. lane_type uint8 [lanes] indexes pictura.LANE_TYPES; lane_links int32 lists
-successors and predecessors; road_edges, stop_lines and building_lines float32 [n, 6] are two ends each. Lengths are metres.)")
+lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length. lane_point_range int32 [lanes, 2]: the
+half-open range of each lane's points. lane_type uint8 [lanes]: indices into pictura.LANE_TYPES. lane_links int32:
+successors and predecessors of all lanes. road_edges, stop_lines, building_lines float32 [n, 6]: both ends of each
+segment.)")
       .def(
           "geometry",
           [](Map& self, bool walls, uint64_t wall_seed, const std::string& light_heads) {
@@ -247,8 +252,8 @@ successors and predecessors; road_edges, stop_lines and building_lines float32 [
             return Geometry{std::shared_ptr<const StaticGeometry>(compiled, &compiled->geometry)};
           },
           py::arg("walls") = true, py::arg("wall_seed") = 0, py::arg("light_heads") = name_of(MapOptions{}.light_heads),
-          R"(Returns the map's geometry for renderers. walls: adds walls along the building lines, with heights drawn from wall_seed.
-light_heads: as for Simulator.)")
+          R"(Returns the map's geometry for renderers. walls: adds walls along the building lines; wall_seed is the random seed of
+their heights. light_heads: as for Simulator.)")
       .def(
           "draw", [](const Map& self, int width_px, int height_px) { return draw(*self.road(), width_px, height_px); },
           py::arg("width_px") = 1024, py::arg("height_px") = 1024,
@@ -258,9 +263,10 @@ light_heads: as for Simulator.)")
                            self.road()->facts.driving_lane_km);
       });
   module.def("_expand_map_names", expand_map_names, py::arg("names"),
-             "Returns the names of maps with every range of generated towns, such as 'procedural:1000-1011', in full.");
+             "Returns the names of maps, in which each range of generated towns, such as 'procedural:1000-1011', is "
+             "expanded.");
   module.def("map_folder", map_folder, R"(
-Returns the folder of towns: $PICTURA_DATA, or the user's data folder.
+Returns the folder in which load() looks for towns: $PICTURA_DATA, or the user's data folder.
 
 Examples:
     >>> isinstance(pictura.map_folder(), str)

@@ -395,8 +395,8 @@ void bind_dtypes(py::module_& module) {
 
 void bind_rig(py::module_& module) {
   py::class_<Camera>(module, "Camera", R"(
-Pinhole camera on a body: x forward, y left, z up, in metres from the rig's origin. Angles are radians: yaw is
-counter-clockwise, positive pitch looks up, positive roll is clockwise as seen from behind.
+Pinhole camera on a body. Its position is in metres from the rig's origin: x forward, y left, z up. Angles are in
+radians. Positive yaw is counter-clockwise, positive pitch looks up, and positive roll is clockwise as seen from behind.
 
 Examples:
     >>> roof = pictura.Camera('roof', 128, 72, position_m=(1.0, 0.0, 1.6), pitch_rad=-0.1)
@@ -420,7 +420,8 @@ Examples:
            py::arg("name"), py::arg("width_px"), py::arg("height_px"), py::kw_only(), py::arg("focal_px") = py::none(),
            py::arg("position_m") = std::array<float, 3>{1.5f, 0, 1.5f}, py::arg("yaw_rad") = 0.0f,
            py::arg("pitch_rad") = 0.0f, py::arg("roll_rad") = 0.0f,
-           "The principal point is the middle; focal_px defaults to 0.8 times the width, about 64 degrees across.")
+           "The principal point is the middle of the image. The default of focal_px is 0.8 times the width, a "
+           "horizontal field of view of about 64 degrees.")
       .def_readwrite("name", &Camera::name)
       .def_readwrite("width_px", &Camera::width_px)
       .def_readwrite("height_px", &Camera::height_px)
@@ -462,19 +463,20 @@ Examples:
     return rig;
   };
   py::class_<Rig>(module, "Rig", R"(
-One or more cameras of any sizes on a body, in the order of images.
+One or more cameras on a body, in the order of their images. Cameras may have different image sizes.
 
 Examples:
     >>> [camera.name for camera in pictura.Rig.paper(96, 54).cameras]
     ['front', 'front_left', 'front_right', 'back']
     >>> len(pictura.Rig([pictura.Camera('front', 64, 36, position_m=(1.5, 0, 1.4))]))
     1)")
-      .def(py::init(made), py::arg("cameras"), "Raises pictura.Error unless there are 1 to 64 valid cameras.")
+      .def(py::init(made), py::arg("cameras"),
+           "Creates a rig of 1 to 64 cameras. Raises pictura.Error for another number or an invalid camera.")
       .def_static("paper", paper_rig, py::arg("width_px") = 96, py::arg("height_px") = 54,
                   py::arg("square_pixels") = false,
                   "Returns the paper's four cameras: front, front left, front right and back. Sizes from 1 to 8192 px.")
       .def_static("load", load_rig, py::arg("path"),
-                  "Reads a rig from a TOML file. Raises pictura.Error naming file, camera and key.")
+                  "Reads a rig from a TOML file. Raises pictura.Error, which names file, camera and key.")
       .def_readonly("cameras", &Rig::cameras)
       .def(py::pickle([](const Rig& rig) { return py::make_tuple(rig.cameras); },
                       [made](const py::tuple& t) { return made(py::cast<std::vector<Camera>>(t[0])); }))
@@ -483,23 +485,32 @@ Examples:
 
 void bind_scene(py::module_& module) {
   py::class_<Scene, std::shared_ptr<Scene>>(module, "Scene", R"(
-Moving objects: boxes of agents and states of lights, for one or more worlds. A simulator's `scene` follows the simulator; a
-scene of arrays is a copy of the arrays.
+Dynamic objects of one or more worlds: boxes of agents and states of traffic lights. Simulator.scene always shows the
+simulator's current state. A scene created from arrays has a copy of them.
 
 Examples:
     >>> car = pictura.Scene(center_m=[[12, 0, 0]], heading_rad=[0], size_m=[[4.4, 1.8, 1.5]], agent_class=[0])
     >>> car.num_worlds, car.boxes.shape
     (1, (1, 36)))")
-      .def(
-          py::init(&make_scene), py::arg("center_m"), py::arg("heading_rad"), py::arg("size_m"), py::arg("agent_class"),
-          py::kw_only(), py::arg("world_begin") = py::none(), py::arg("geometry") = py::none(),
-          py::arg("light_states") = py::none(), py::arg("light_begin") = py::none(),
-          R"(center_m [n, 3]: centre of the box's foot. heading_rad [n]. size_m [n, 3]: length, width, height. agent_class [n]: 0 vehicle, 1
-cyclist, 2 pedestrian. world_begin [worlds + 1]: first box of each world; default: a single world. geometry [worlds]: handles of
-uploaded geometries; default: 0. light_states: 0 off, 1 red, 2 yellow, 3 green, 4 unknown, of all worlds; light_begin [worlds +
-1]. Raises pictura.Error for other shapes; render() rejects arrays that do not fit together.)")
+      .def(py::init(&make_scene), py::arg("center_m"), py::arg("heading_rad"), py::arg("size_m"),
+           py::arg("agent_class"), py::kw_only(), py::arg("world_begin") = py::none(), py::arg("geometry") = py::none(),
+           py::arg("light_states") = py::none(), py::arg("light_begin") = py::none(),
+           R"(Creates a scene from arrays.
+
+Args:
+    center_m: [n, 3], centres of the boxes' feet, in metres.
+    heading_rad: [n], headings in radians.
+    size_m: [n, 3], length, width and height of boxes, in metres.
+    agent_class: [n], 0 vehicle, 1 cyclist, 2 pedestrian.
+    world_begin: [worlds + 1], index of the first box of each world, followed by n; default: a single world.
+    geometry: [worlds], handle of each world's geometry, as in Renderer.upload(); default: 0.
+    light_states: States of the lights of all worlds: 0 off, 1 red, 2 yellow, 3 green, 4 unknown.
+    light_begin: [worlds + 1], index of the first light of each world, followed by the number of lights.
+
+Raises:
+    pictura.Error: An array has another shape. Inconsistent arrays raise the error later, in render().)")
       .def_property_readonly(
-          "num_worlds", [](const Scene& self) { return self.batch().geometry.size(); }, py::doc("Worlds."))
+          "num_worlds", [](const Scene& self) { return self.batch().geometry.size(); }, py::doc("Number of worlds."))
       .def_property_readonly(
           "boxes",
           [](const Scene& self) {
@@ -510,11 +521,11 @@ uploaded geometries; default: 0. light_states: 0 off, 1 red, 2 yellow, 3 green, 
                            self.owner, self.stream, false, "scene boxes"};
             return lent;
           },
-          py::doc(
-              "uint8 [boxes, 36], read-only: `numpy.asarray(boxes).view(BOX_DTYPE)[:, 0]` has their fields by name."));
+          py::doc("Boxes, read-only, uint8 [boxes, 36]. `numpy.asarray(boxes).view(BOX_DTYPE)[:, 0]` has the fields by "
+                  "name."));
 
   py::class_<SceneFile>(module, "SceneFile", R"(
-Scene of one TOML file: geometry, boxes, rig and views.
+Scene in a TOML file: geometry, boxes, rig and views.
 
 Examples:
     >>> text = '''size_px = [96, 54]
@@ -526,7 +537,8 @@ Examples:
     >>> _ = pathlib.Path('empty.toml').write_text(text)
     >>> pictura.SceneFile('empty.toml').view_names
     ['view0'])")
-      .def(py::init(&load_scene), py::arg("path"), "Raises pictura.Error naming file, line, table and key.")
+      .def(py::init(&load_scene), py::arg("path"),
+           "Reads a scene file. Raises pictura.Error, which names file, line, table and key.")
       .def_property_readonly("rig", [](const SceneFile& self) { return self.config.rig; })
       .def_property_readonly("line_floor_px", [](const SceneFile& self) { return self.config.line_floor_px; })
       .def_property_readonly(
@@ -534,18 +546,25 @@ Examples:
           [](const SceneFile& self) { return Geometry{std::make_shared<const StaticGeometry>(self.geometry)}; })
       .def_property_readonly(
           "scene", [](const SceneFile& self) { return scene_of(std::make_shared<SceneOwner>(self.scene)); },
-          py::doc("Its world is on geometry 0."))
+          py::doc("Scene of one world, whose geometry has the handle 0."))
       .def_property_readonly(
           "views", [](const SceneFile& self) { return view_array(self.views); }, py::doc("VIEW_DTYPE [n]."))
       .def_readonly("view_names", &SceneFile::view_names);
 
   module.def("make_views", make_views, py::arg("origin_m"), py::arg("heading_rad"), py::kw_only(),
              py::arg("world") = py::none(), py::arg("ego_agent") = py::none(), py::arg("body_length_m") = py::none(),
-             R"(Returns poses of a rig, a NumPy array of VIEW_DTYPE [n].
+             R"(Returns views (poses of a rig) as a NumPy array of VIEW_DTYPE [n].
 
-origin_m [n, 3]: origin of the rig, on the ground. heading_rad [n]. world [n]: default: 0. ego_agent [n]: box of the scene that
-is left out, -1 for none. body_length_m [n]: bodies shorter than 4.5 m move cameras nearer to their origin. Raises
-pictura.Error for other shapes.
+Args:
+    origin_m: [n, 3], origins of the rig on the ground, in metres.
+    heading_rad: [n], headings in radians.
+    world: [n], indices of worlds; default: 0.
+    ego_agent: [n], index of the box in the scene that is not drawn in the view; -1: none.
+    body_length_m: [n], lengths of the bodies that carry the rig. Bodies shorter than 4.5 m move the cameras closer to
+        the origin.
+
+Raises:
+    pictura.Error: An array has another shape.
 
 Examples:
     >>> pictura.make_views(origin_m=[[0, 0, 0], [5, 0, 0]], heading_rad=[0, 1.5]).shape
@@ -554,8 +573,8 @@ Examples:
 
 void bind_images(py::module_& module) {
   py::class_<Images, std::shared_ptr<Images>>(module, "Images", R"(
-Images of views by each camera of a rig, in the renderer's memory, and their planes if requested. A renderer can draw into them
-repeatedly.
+Images of several views by all cameras of a rig, in the renderer's memory. They may have planes: depth, class and
+instance of each pixel. A renderer can draw into the same images repeatedly.
 
 Examples:
     >>> renderer = pictura.Renderer('cpu', pictura.Rig.paper(32, 18))
@@ -563,7 +582,8 @@ Examples:
     >>> images.rgb.shape, images.camera(0).shape
     ((5, 4, 3, 18, 32), (5, 3, 18, 32)))")
       .def_property_readonly(
-          "num_views", [](const Images& self) { return self.layout().num_views; }, py::doc("Capacity in views."))
+          "num_views", [](const Images& self) { return self.layout().num_views; },
+          py::doc("Number of views for which memory is allocated."))
       .def_property_readonly(
           "rgb",
           [](const std::shared_ptr<Images>& self) {
@@ -572,7 +592,7 @@ Examples:
                           self->layout().blocks.size());
             return Images::block(self, 0);
           },
-          py::doc("[views, cameras, 3, height, width], for a rig whose cameras have one size."))
+          py::doc("[views, cameras, 3, height, width], for a rig whose cameras have the same image size."))
       .def_property_readonly(
           "blocks",
           [](const std::shared_ptr<Images>& self) {
@@ -580,7 +600,7 @@ Examples:
             for (size_t i = 0; i < self->layout().blocks.size(); ++i) blocks.append(Images::block(self, i));
             return blocks;
           },
-          py::doc("Arrays [views, cameras of one size, 3, height, width], one for each distinct size."))
+          py::doc("Arrays [views, cameras, 3, height, width], one for the cameras of each image size."))
       .def(
           "camera",
           [](const std::shared_ptr<Images>& self, size_t index) {
@@ -588,7 +608,7 @@ Examples:
                           self->layout().cameras.size(), index);
             return Images::camera(self, index);
           },
-          py::arg("index"), "[views, 3, height, width] of one camera.")
+          py::arg("index"), "Returns the images of one camera, [views, 3, height, width].")
       .def(
           "planes",
           [](const std::shared_ptr<Images>& self, size_t index) {
@@ -602,16 +622,16 @@ Examples:
             return planes;
           },
           py::arg("camera"),
-          R"(Returns planes of the front surface at each pixel's centre, [views, height, width]: depth_m float32 (infinite without a
-surface), class_id uint8 (0: none), instance_id uint16 (1 + the agent's index in its world, 0: no agent). Raises pictura.Error
-for images without planes.)");
+          R"(Returns planes [views, height, width], which describe the visible surface at each pixel's centre: depth_m float32
+(infinite if there is no surface), class_id uint8 (0: none), instance_id uint16 (1 + the agent's index in its world; 0:
+no agent). Raises pictura.Error for images without planes.)");
 }
 
 void bind_renderer(py::module_& module) {
   py::class_<RendererInside>(module, "_RendererInside");
   py::class_<PyRenderer>(module, "Renderer", R"(
-Draws scenes: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'. One thread at a time; several renderers are
-independent. On CUDA its work is enqueued on `stream`.
+Renderer of scenes. Only one thread at a time may use a renderer; different renderers are independent. On CUDA, work is
+enqueued on `stream`.
 
 Examples:
     >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
@@ -621,33 +641,44 @@ Examples:
     >>> images = renderer.render(simulator.scene, simulator.views)
     >>> images.rgb.numpy().shape                    # views, cameras, channels, height, width
     (4, 4, 3, 18, 32))")
-      .def(
-          py::init([](const std::string& name, const std::optional<Rig>& rig, const std::string& device,
-                      int num_threads, float line_floor_px, bool debug_palette, const std::string& samples,
-                      double camera_severity, const py::object& stream) {
-            RendererConfig config;
-            if (rig) config.rig = *rig;
-            config.device = device_of(device);
-            config.num_threads = num_threads;
-            config.line_floor_px = line_floor_px;
-            config.debug_palette = debug_palette;
-            config.samples = samples_of(samples);
-            if (!(camera_severity >= 0 && camera_severity <= kMaxCameraSeverity)) {
-              fail_usage("Renderer: camera_severity: expected 0 to {}, got {}", kMaxCameraSeverity, camera_severity);
-            }
-            config.randomization = scaled(kFullCameraSeverity, camera_severity);
-            check_process("Renderer", num_threads, config.device);
-            return std::make_unique<PyRenderer>(name, config, stream_of(stream));
-          }),
-          py::arg("name") = "auto", py::arg("rig") = py::none(), py::kw_only(), py::arg("device") = "cpu",
-          py::arg("num_threads") = 0, py::arg("line_floor_px") = RendererConfig{}.line_floor_px,
-          py::arg("debug_palette") = false, py::arg("samples") = "1", py::arg("camera_severity") = 0.0,
-          py::arg("stream") = py::none(),
-          R"(rig: default: the paper's. device: memory of scenes, views and images, 'cpu' or 'cuda:0'. num_threads: 0 for all. line_floor_px:
-minimum width of a line on screen. debug_palette: tints halted and parked agents. samples: for 'gl', '4' (MSAA) or '4x4'
-(supersampling). camera_severity: severity of randomized cameras, 0 to 2, as in evaluations (docs/explanation/cameras.md); draws
-are keyed by the field `key` of views, which a simulator fills. stream: a cudaStream_t as int; None: the legacy default stream.
-Raises pictura.UsageError listing the names, pictura.Error if the backend cannot run here.)")
+      .def(py::init([](const std::string& name, const std::optional<Rig>& rig, const std::string& device,
+                       int num_threads, float line_floor_px, bool debug_palette, const std::string& samples,
+                       double camera_severity, const py::object& stream) {
+             RendererConfig config;
+             if (rig) config.rig = *rig;
+             config.device = device_of(device);
+             config.num_threads = num_threads;
+             config.line_floor_px = line_floor_px;
+             config.debug_palette = debug_palette;
+             config.samples = samples_of(samples);
+             if (!(camera_severity >= 0 && camera_severity <= kMaxCameraSeverity)) {
+               fail_usage("Renderer: camera_severity: expected 0 to {}, got {}", kMaxCameraSeverity, camera_severity);
+             }
+             config.randomization = scaled(kFullCameraSeverity, camera_severity);
+             check_process("Renderer", num_threads, config.device);
+             return std::make_unique<PyRenderer>(name, config, stream_of(stream));
+           }),
+           py::arg("name") = "auto", py::arg("rig") = py::none(), py::kw_only(), py::arg("device") = "cpu",
+           py::arg("num_threads") = 0, py::arg("line_floor_px") = RendererConfig{}.line_floor_px,
+           py::arg("debug_palette") = false, py::arg("samples") = "1", py::arg("camera_severity") = 0.0,
+           py::arg("stream") = py::none(),
+           R"(Creates a renderer.
+
+Args:
+    name: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'.
+    rig: Cameras; default: the paper's rig.
+    device: Memory of scenes, views and images: 'cpu' or 'cuda:0'.
+    num_threads: Number of CPU threads; 0: all.
+    line_floor_px: Minimum width of a line in images, in pixels.
+    debug_palette: Whether halted and parked agents have other colours.
+    samples: For 'gl': '4' (MSAA) or '4x4' (supersampling).
+    camera_severity: Severity of randomized cameras, 0 to 2, as in evaluations (docs/explanation/cameras.md). The field
+        `key` of a view, which a simulator sets, keys the random numbers.
+    stream: A cudaStream_t as int; None: the legacy default stream.
+
+Raises:
+    pictura.UsageError: The name is unknown; the message lists the valid names.
+    pictura.Error: The renderer cannot run on this machine.)")
       .def_static(
           "_of", [](const RendererInside& inside) { return std::make_unique<PyRenderer>(inside.renderer); },
           py::arg("inside"))
@@ -659,15 +690,15 @@ Raises pictura.UsageError listing the names, pictura.Error if the backend cannot
       .def_property(
           "stream", [](const PyRenderer& self) { return reinterpret_cast<intptr_t>(self.stream().handle); },
           [](PyRenderer& self, const py::object& stream) { self.set_stream(stream_of(stream)); },
-          py::doc("cudaStream_t of the work, as int; 0: the legacy default stream."))
+          py::doc("The cudaStream_t on which work is enqueued, as int; 0: the legacy default stream."))
       .def(
           "upload",
           [](PyRenderer& self, int handle, const Geometry& geometry) {
             self.calls().run("upload", [&] { self.renderer().upload(handle, *geometry.geometry, self.stream()); });
           },
           py::arg("handle"), py::arg("geometry"),
-          "Copies a geometry under `handle`, 0 to 65535, which scenes refer to. Raises pictura.Error if the geometry "
-          "is invalid.")
+          "Copies a geometry to the renderer. Scenes refer to it by `handle`, 0 to 65535. Raises pictura.Error if the "
+          "geometry is invalid.")
       .def(
           "make_images",
           [](PyRenderer& self, int num_views, const std::string& type, bool planes) {
@@ -675,23 +706,28 @@ Raises pictura.UsageError listing the names, pictura.Error if the backend cannot
                                             self.renderer().device(), self.stream());
           },
           py::arg("num_views"), py::kw_only(), py::arg("dtype") = "uint8", py::arg("planes") = false,
-          "Allocates images of num_views views: 'uint8' of 0 to 255, or 'float32' or 'float16' (not on all renderers) "
-          "of 0 to 1.")
+          "Allocates images for num_views views. dtype: 'uint8' has values from 0 to 255; 'float32' and 'float16', "
+          "which some renderers lack, have values from 0 to 1. planes: whether depth, class and instance are drawn "
+          "too.")
       .def("render", &PyRenderer::render, py::arg("scene"), py::arg("views"), py::arg("out") = py::none(),
            py::kw_only(), py::arg("dtype") = "uint8", py::arg("planes") = false,
-           R"(Draws every camera for every view. Returns `out`.
+           R"(Draws the images of every camera for every view. Returns `out`.
 
-views: VIEW_DTYPE [n], or a simulator's. out: Images, or for a rig of one size an array [n, cameras, 3, height, width] of uint8,
-float32, float16 or bfloat16 (0 to 255) in the renderer's memory (NumPy, torch, ...); default: new Images of `dtype` and
-`planes`. On CUDA the call returns when the work is enqueued; on the CPU ^C ends it between views. Raises pictura.Error naming
-the array that does not fit.)")
-      .def(
-          "visibility", &PyRenderer::visibility, py::arg("scene"), py::arg("views"), py::arg("queries"),
-          R"(Returns the visibility of agents: for each query of (view, box of the scene), int [n, 2], the coverage in the view's images over
-the coverage when drawn alone, float32 [n]; NaN outside all cameras' frames.)")
+views: VIEW_DTYPE [n], or Simulator.views.
+out: Images, or an array [n, cameras, 3, height, width] in the renderer's memory (NumPy, torch, ...) if all cameras have
+the same image size. Its type is uint8, float32, float16 or bfloat16, with values from 0 to 255. Default: new Images
+with `dtype` and `planes`.
+On CUDA the call returns when the work is enqueued. On the CPU, ^C ends the call between two views. Raises
+pictura.Error, which names an invalid array.)")
+      .def("visibility", &PyRenderer::visibility, py::arg("scene"), py::arg("views"), py::arg("queries"),
+           R"(Returns the visibility of agents, float32 [n].
+
+queries: int [n, 2], pairs of (index of the view, index of the box in the scene).
+A visibility is the area that the box covers in the view's images, divided by the area that it covers if it is drawn
+alone. It is NaN if the box is outside the images of all cameras.)")
       .def(
           "check", [](PyRenderer& self) { self.calls().run("check", [&] { self.renderer().check(self.stream()); }); },
-          "Waits for the work on the stream; raises pictura.Error for faults found by a device.");
+          "Waits for the work on the stream. Raises pictura.Error for errors that CUDA kernels have found.");
   module.def("renderer_names", renderer_names, R"(
 Returns the renderers of this build.
 

@@ -150,8 +150,8 @@ py::dict dict_of(const ReplayMetrics& metrics) {
 
 void bind_replays(py::module_& module) {
   py::class_<PyRecorder, std::shared_ptr<PyRecorder>>(module, "Recorder", R"(
-Records a world of a simulator on the CPU from now on: every step of the simulator, by any function, as long as the recorder
-lives.
+Records one world as a replay. The simulator must be on the CPU. While the recorder exists, it records every step of the
+simulator, by any function.
 
 Examples:
     >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
@@ -160,39 +160,41 @@ Examples:
     >>> recorder.write('drive.html')
     >>> recorder.num_steps
     50)")
-      .def(
-          py::init([](const py::object& simulator, int world, int follow, const std::optional<Rig>& rig) {
-            SimulatorInside inside = inside_of<SimulatorInside>(simulator, "Recorder", "Simulator");
-            const auto watch = inside.watch;
-            auto recorder = std::make_shared<PyRecorder>(
-                std::move(inside),
-                RecorderOptions{
-                    .world = world, .followed = follow, .cameras = cameras_of(rig), .keeps_images = rig.has_value()});
-            watch(recorder);
-            return recorder;
-          }),
-          py::arg("simulator"), py::kw_only(), py::arg("world") = 0, py::arg("follow") = -1,
-          py::arg("rig") = py::none(), py::keep_alive<1, 2>(),
-          R"(follow: agent of that world with which the page opens, and whose decisions are recorded; -1: none. rig: records that agent's
-images at every step, drawn by the CPU renderer, without loss; by default the page draws the paper's cameras itself. Raises
-pictura.UsageError if the world or agent does not exist or the simulator is on a device.)")
+      .def(py::init([](const py::object& simulator, int world, int follow, const std::optional<Rig>& rig) {
+             SimulatorInside inside = inside_of<SimulatorInside>(simulator, "Recorder", "Simulator");
+             const auto watch = inside.watch;
+             auto recorder = std::make_shared<PyRecorder>(
+                 std::move(inside),
+                 RecorderOptions{
+                     .world = world, .followed = follow, .cameras = cameras_of(rig), .keeps_images = rig.has_value()});
+             watch(recorder);
+             return recorder;
+           }),
+           py::arg("simulator"), py::kw_only(), py::arg("world") = 0, py::arg("follow") = -1,
+           py::arg("rig") = py::none(), py::keep_alive<1, 2>(),
+           R"(follow: agent that the page shows first, and whose decisions are recorded; -1: none.
+rig: cameras whose images of this agent are recorded at every step, losslessly, with the CPU renderer. By default no
+images are recorded, and the page draws images of the paper's cameras.
+Raises pictura.UsageError if the world or agent does not exist or the simulator is on CUDA.)")
       .def(
           "decide",
           [](PyRecorder& self, const py::array_t<float, py::array::c_style | py::array::forcecast>& logits,
              float value) { self.decide(decision_of_python(logits, value)); },
           py::arg("logits"), py::arg("value") = 0.0f,
-          "Records a policy's response to the followed agent's state, for the next step: logits [12], and its value.")
-      .def_property_readonly("num_steps", &PyRecorder::num_steps, "Number of steps and resets so far.")
+          "Records a policy's logits [12] and value for the followed agent, which belong to the next step.")
+      .def_property_readonly("num_steps", &PyRecorder::num_steps, "Number of recorded steps and resets.")
       .def_property_readonly(
           "metrics", [](const PyRecorder& self) { return dict_of(self.metrics()); }, "Counts and sums so far, by name.")
       .def(
           "write", &PyRecorder::write, py::arg("path"), py::arg("policy") = "",
-          R"(Ends the recording and writes it, completely or not at all: *.html, a page for any browser, or *.mcap, for Foxglove. May be
-called repeatedly. policy: its name in the page. Raises pictura.Error naming the file.)");
+          R"(Ends the recording and writes it to a file, completely or not at all: *.html, a page for any browser, or *.mcap, for
+Foxglove. May be called repeatedly. policy: name of the policy, which the page shows. Raises pictura.Error if the file
+cannot be written.)");
 
   py::class_<PyLiveView, std::shared_ptr<PyLiveView>>(module, "LiveView", R"(
-Page in the browser that shows the only world of a simulator on the CPU while it runs: pause, step, pace, and drive an agent
-with the keyboard. The simulator's steps then wait until they are due: in real time, or at the page's pace.
+Live page in the browser, which shows the only world of a simulator while it runs. The simulator must be on the CPU. The
+page can pause the simulator, take single steps, change the speed, and drive an agent with the keyboard. Steps of the
+simulator wait, so that they run in real time or at the speed that the page sets.
 
 Examples:
     >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
@@ -201,37 +203,39 @@ Examples:
     True
     >>> simulator.run(pictura.Controller('lane', simulator), 3)
     >>> view.close())")
-      .def(
-          py::init([](const py::object& simulator, int port, const std::string& host_name, int follow,
-                      const std::optional<Rig>& rig, bool wait_for_page) {
-            SimulatorInside inside = inside_of<SimulatorInside>(simulator, "LiveView", "Simulator");
-            const auto watch = inside.watch;
-            auto view =
-                std::make_shared<PyLiveView>(std::move(inside), LiveViewOptions{.port = port,
-                                                                                .host_name = host_name,
-                                                                                .watched = follow,
-                                                                                .cameras = cameras_of(rig),
-                                                                                .sends_images = rig.has_value(),
-                                                                                .waits_for_page = wait_for_page});
-            watch(view);
-            return view;
-          }),
-          py::arg("simulator"), py::kw_only(), py::arg("port") = 0, py::arg("host_name") = "", py::arg("follow") = 0,
-          py::arg("rig") = py::none(), py::arg("wait_for_page") = true, py::keep_alive<1, 2>(),
-          R"(port: of the loopback, 0 for a free one. host_name: if given, listens on all addresses, for pages that address this machine by
-this name. follow: agent with which pages open. rig: cameras of its images; by default pages draw the paper's cameras
-themselves. wait_for_page: waits for the first page before the first step. Raises pictura.UsageError if this package lacks the
-server, pictura.Error if the port is in use.)")
+      .def(py::init([](const py::object& simulator, int port, const std::string& host_name, int follow,
+                       const std::optional<Rig>& rig, bool wait_for_page) {
+             SimulatorInside inside = inside_of<SimulatorInside>(simulator, "LiveView", "Simulator");
+             const auto watch = inside.watch;
+             auto view =
+                 std::make_shared<PyLiveView>(std::move(inside), LiveViewOptions{.port = port,
+                                                                                 .host_name = host_name,
+                                                                                 .watched = follow,
+                                                                                 .cameras = cameras_of(rig),
+                                                                                 .sends_images = rig.has_value(),
+                                                                                 .waits_for_page = wait_for_page});
+             watch(view);
+             return view;
+           }),
+           py::arg("simulator"), py::kw_only(), py::arg("port") = 0, py::arg("host_name") = "", py::arg("follow") = 0,
+           py::arg("rig") = py::none(), py::arg("wait_for_page") = true, py::keep_alive<1, 2>(),
+           R"(port: port on the loopback interface; 0: a free port.
+host_name: if given, the server listens on all interfaces, and browsers reach this machine by this name.
+follow: agent that pages show first.
+rig: cameras of this agent's images; by default pages draw images of the paper's cameras.
+wait_for_page: whether the first step waits for the first page.
+Raises pictura.UsageError if this package has no server, and pictura.Error if the port is in use.)")
       .def(
           "decide",
           [](PyLiveView& self, int agent, const py::array_t<float, py::array::c_style | py::array::forcecast>& logits,
              float value) { self.decide(agent, decision_of_python(logits, value)); },
           py::arg("agent"), py::arg("logits"), py::arg("value") = 0.0f,
-          "Shows a policy's response to an agent's state while pages follow that agent, until the next call.")
-      .def_property_readonly("address", &PyLiveView::address, "Address of the page, including its secret.")
+          "Sets a policy's logits [12] and value for an agent. Pages that follow this agent show them until the next "
+          "call.")
+      .def_property_readonly("address", &PyLiveView::address, "URL of the page, including a secret token.")
       .def_property_readonly("num_pages", &PyLiveView::num_pages, "Number of connected pages.")
       .def("close", &PyLiveView::close,
-           "Tells pages that the simulation has ended, and lets the simulator run freely.");
+           "Notifies pages that the simulation has ended. The simulator's steps no longer wait.");
 
   module.def(
       "write_gallery",
@@ -240,8 +244,8 @@ server, pictura.Error if the port is in use.)")
         return write_gallery(folder);
       },
       py::arg("folder"),
-      R"(Writes FOLDER/index.html over the replays in the folder, worst first, and returns their number. Raises pictura.Error naming a
-page that is no replay.
+      R"(Writes FOLDER/index.html, an index of the replays in the folder, sorted from the worst. Returns the number of replays.
+Raises pictura.Error, which names a page that is not a replay.
 
 Examples:
     >>> pictura.write_gallery('replays')            # doctest: +SKIP

@@ -211,10 +211,11 @@ class PySceneRecorder final : public StepObserver {
 
 void bind_scenarios(py::module_& module) {
   py::class_<RecordedScene, Map, std::shared_ptr<RecordedScene>>(module, "Scenario", R"(
-Recorded scene: a map, the tracks of all road users, and the recorded lights. Immutable.
+Recorded scene: a map, the tracks of all road users, and the recorded traffic lights. A scenario is immutable.
 
-A scenario is the map of worlds whose agents are its tracks, in their order, from `start_step` on:
-pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands of kind 3 and the controller 'log' replay it.
+A simulator uses a scenario as the map of a world. The agents of this world are the tracks, in the same order, from
+`start_step` on: pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). The controller 'log' and commands
+of kind 3 replay the tracks.
 
 Examples:
     >>> scene = pictura.Scenario.load('drive.scenario')            # or FILE.tfrecord#7, FILE.json, a folder
@@ -224,11 +225,11 @@ Examples:
     True)")
       .def_static(
           "load", load_scene, py::arg("name"), py::kw_only(), py::arg("start_step") = 0,
-          R"(Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of these; '#7' or
-'#SCENARIO_ID' selects one of several scenes.
+          R"(Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of such
+files. A suffix '#7' or '#SCENARIO_ID' selects one of several scenes.
 
 start_step: step of the recording at which episodes begin.
-Raises pictura.Error naming file, record and field; pictura.UsageError if the scene or step does not exist.)")
+Raises pictura.Error, which names file, record and field, and pictura.UsageError if the scene or step does not exist.)")
       .def_static(
           "from_arrays",
           [](const py::dict& tracks, const py::dict& lanes, const std::optional<py::dict>& lines,
@@ -244,47 +245,59 @@ Raises pictura.Error naming file, record and field; pictura.UsageError if the sc
           py::arg("lights") = py::none(), py::arg("dt_s") = 0.1, py::arg("current_step") = py::none(),
           py::arg("sdc_track") = py::none(), py::arg("id") = "", py::arg("origin_m") = py::none(),
           py::arg("tolerance_m") = 0.01,
-          R"(Creates a scene from arrays in dicts: NumPy arrays, or objects that convert to them. Lengths are metres, positions float64 in
-any frame.
+          R"(Creates a scene from dicts of NumPy arrays, or of objects that NumPy converts to arrays.
 
-tracks: id int64 [T], type [T] (index in pictura.TRACK_TYPES), size_m [T, 3] (length, width, height), valid bool [T, S],
-position_m [T, S, 3] (of the box's foot), heading_rad [T, S], velocity_mps [T, S, 2]; states that are not valid may hold
-anything.
-Polylines are points float64 [P, 3], one polyline after the other, and begin int32 [N + 1], the offset of each polyline in the
-points and the end of the last.
-lanes: points and begin along the centre, id int64 [N] of 0 or more, type [N] (pictura.LANE_TYPES); if known speed_limit_mps [N]
-(0: unknown), width_m [P] (all 0 along a lane: unknown), in_junction bool [N], entries and exits, ids of lanes one after the
-other, with entries_begin and exits_begin [N + 1], left_neighbor and right_neighbor [N], ids of lanes of the same direction, or
--1. Without entries and exits, lanes are linked at common ends.
-lines: points, begin, type [N] (pictura.LINE_TYPES). edges: points and begin, with the road on the left. crosswalks: points and
-begin of their outlines. stop_signs: position_m [N, 3], lanes with lanes_begin. lights: lanes with lanes_begin [L + 1], states
-[L, S] (pictura.LIGHT_STATES), and stop_lines [L, 2, 3]; by default stop lines cross the begins of the lanes.
-dt_s: time between states. current_step: step of the present; None: 10, or the last step. sdc_track: index of the self-driving
-car's track. origin_m: of the map, about which numbers are rounded to float32; None: the middle of lanes and edges. tolerance_m:
-maximum deviation of lines when they are thinned; 0 keeps all points.
-Raises pictura.UsageError naming the array and the element, pictura.Error if the arrays do not form a scene.)")
+Lengths are in metres. Positions are float64 in any frame. Polylines are given by two arrays: points float64 [P, 3], the
+points of all polylines one after the other, and begin int32 [N + 1], the index of each polyline's first point, followed
+by P. Lists of ids are given in the same way, for example by lanes and lanes_begin.
+
+Args:
+    tracks: id int64 [T]; type [T], indices into pictura.TRACK_TYPES; size_m [T, 3], length, width and height; valid
+        bool [T, S]; position_m [T, S, 3], centre of the box's foot; heading_rad [T, S]; velocity_mps [T, S, 2]. States
+        that are not valid may contain any numbers.
+    lanes: points and begin of centre lines; id int64 [N], 0 or more; type [N], indices into pictura.LANE_TYPES.
+        Optional: speed_limit_mps [N], 0 if unknown; width_m [P], all 0 along a lane of unknown width; in_junction bool
+        [N]; entries and exits, ids of linked lanes, with entries_begin and exits_begin [N + 1]; left_neighbor and
+        right_neighbor [N], ids of lanes of the same direction, or -1. Without entries and exits, lanes are linked where
+        their ends coincide.
+    lines: points, begin, and type [N], indices into pictura.LINE_TYPES.
+    edges: points and begin of road edges, with the road on their left.
+    crosswalks: points and begin of outlines.
+    stop_signs: position_m [N, 3]; lanes, ids of the controlled lanes, with lanes_begin [N + 1].
+    lights: lanes, ids of the controlled lanes, with lanes_begin [L + 1]; states [L, S], indices into
+        pictura.LIGHT_STATES; stop_lines [L, 2, 3], by default across the beginning of the lanes.
+    dt_s: Time between states in seconds.
+    current_step: Step of the present, at which the history ends. None: 10, or the last step if there are fewer.
+    sdc_track: Index of the self-driving car's track.
+    id: Id of the scene.
+    origin_m: Origin of the map's frame, in which positions are rounded to float32. None: the middle of lanes and edges.
+    tolerance_m: Maximum deviation of polylines when points are removed. 0 keeps all points.
+
+Raises:
+    pictura.UsageError: An array is invalid; the message names the array and the element.
+    pictura.Error: The arrays do not form a scene.)")
       .def(
           "to_arrays", [](const RecordedScene& self) { return arrays_of_scene(*self.scenario()); },
-          R"(Returns the arguments by name with which pictura.Scenario.from_arrays(**arrays) creates the same scene.
+          R"(Returns a dict of arguments with which pictura.Scenario.from_arrays(**arrays) creates the same scene.
 
-The arrays do not contain: tracks to predict and tracks marked for replay, walls, parking spaces, signs other than stop signs,
-widths of paint, and the data with which a saved run replays to the bit.)")
+The result does not contain tracks to predict, tracks marked for replay, walls, parking spaces, signs other than stop
+signs, widths of paint, and the data for bit-exact replay of a saved run.)")
       .def(
           "starting_at",
           [](const RecordedScene& self, int32_t start_step) {
             return std::make_shared<RecordedScene>(self.scenario(), self.source(), start_step, self.recorded_lights());
           },
           py::arg("start_step"),
-          R"(Returns the same scene with episodes that begin at another step; nothing is copied.
+          R"(Returns the same scene with another start step, without copying data.
 
-Raises pictura.UsageError for a step that the scene does not have.)")
+Raises pictura.UsageError if the scene does not have this step.)")
       .def(
           "with_recorded_lights",
           [](const RecordedScene& self) {
             return std::make_shared<RecordedScene>(self.scenario(), self.source(), self.start_step(), true);
           },
-          "Returns the same scene with worlds that use its recorded lights: they are drawn and observed, and red "
-          "lights count.")
+          "Returns the same scene with its recorded lights enabled: worlds draw and observe them, and crossing a red "
+          "light is an infraction.")
       .def_property_readonly(
           "start_step", [](const RecordedScene& self) { return self.start_step(); },
           py::doc("Step of the recording at which episodes begin."))
@@ -296,7 +309,7 @@ Raises pictura.UsageError for a step that the scene does not have.)")
           py::doc("File format: 'womd', 'gpudrive', 'pufferdrive v1', ..."))
       .def_property_readonly(
           "num_tracks", [](const RecordedScene& self) { return self.scenario()->tracks.size(); },
-          py::doc("Number of agents of its worlds."))
+          py::doc("Number of tracks, and of agents in each of the scene's worlds."))
       .def_property_readonly(
           "num_steps", [](const RecordedScene& self) { return self.scenario()->num_steps; },
           py::doc("Number of states of each track, from the recording's first step on."))
@@ -304,29 +317,30 @@ Raises pictura.UsageError for a step that the scene does not have.)")
           "dt_s", [](const RecordedScene& self) { return self.scenario()->dt_s; }, py::doc("Seconds between states."))
       .def_property_readonly(
           "current_step", [](const RecordedScene& self) { return self.scenario()->current_step; },
-          py::doc("Last step of the history that predictors are given."))
+          py::doc("Step of the present: the last step of the history that a predictor may use."))
       .def_property_readonly(
           "sdc_track",
           [](const RecordedScene& self) -> std::optional<int32_t> {
             const int32_t track = self.scenario()->sdc_track;
             return track < 0 ? std::nullopt : std::optional(track);
           },
-          py::doc("Track of the self-driving car; None if the file does not mark it."))
+          py::doc("Index of the self-driving car's track; None if the file does not mark it."))
       .def_property_readonly(
           "facts", [](const RecordedScene& self) { return facts_of_scene(*self.scenario()); },
           py::doc(
               "Counts and lengths of the map, and counts of tracks and lights, by name, as `pictura map` prints them."))
       .def_property_readonly(
           "notes", [](const RecordedScene& self) { return notes_of(*self.scenario()); },
-          py::doc("Elements that were dropped or changed when the file was converted: (what, how often, first place) "
-                  "each."))
+          py::doc("Elements that the conversion of the file dropped or changed: a tuple (kind, count, place of the "
+                  "first) for each kind."))
       .def(
           "tracks", [](const RecordedScene& self) { return tracks_of_scene(*self.scenario()); },
-          R"(Copies the tracks to NumPy arrays by name.
+          R"(Returns copies of the tracks as NumPy arrays by name.
 
-id int64 [tracks], as in the file; type uint8 [tracks] indexes pictura.TRACK_TYPES; size_m float32 [tracks, 3]: length, width,
-height. valid bool [tracks, steps]; position_m float32 [tracks, steps, 3], centre of the box's foot in the map's frame;
-heading_rad [tracks, steps]; velocity_mps [tracks, steps, 2]: 0 where not valid.)")
+id int64 [tracks]: ids in the file. type uint8 [tracks]: indices into pictura.TRACK_TYPES. size_m float32 [tracks, 3]:
+length, width, height. valid bool [tracks, steps]: whether the state is recorded. position_m float32 [tracks, steps, 3]:
+centre of the box's foot in the map's frame. heading_rad [tracks, steps]. velocity_mps [tracks, steps, 2]: 0 if
+the state is not valid.)")
       .def(
           "mask",
           [](const RecordedScene& self, const std::string& words, bool absent) {
@@ -334,16 +348,18 @@ heading_rad [tracks, steps]; velocity_mps [tracks, steps, 2]: 0 where not valid.
             return mask_of(absent ? tracks_of(scenario, words) : tracks_of(scenario, words, self.start_step()));
           },
           py::arg("words"), py::kw_only(), py::arg("absent") = false,
-          R"(Returns uint8 [tracks]: 1 for the tracks that comma-separated words select: self (the self-driving car), vehicles (the others),
-others (all non-vehicles), all, tracks_to_predict, objects_of_interest, and ids of tracks.
+          R"(Returns a mask uint8 [tracks], which is 1 for selected tracks.
 
-absent: includes tracks that are absent at start_step. Raises pictura.UsageError for another word, and if no track remains.)")
+words: comma-separated list of self (the self-driving car), vehicles (all other vehicles), others (all non-vehicles),
+all, tracks_to_predict, objects_of_interest, and ids of tracks.
+absent: also selects tracks that are absent at start_step.
+Raises pictura.UsageError for an unknown word, and if no track is selected.)")
       .def(
           "world", world_of,
-          R"(Returns the options with which pictura.Simulator([scene], worlds, **options) creates the scene's worlds: the recording's time
-step, an episode as long as the rest of the recording, no walls, no parked cars, no early end, plain dynamics.
+          R"(Returns the options for pictura.Simulator([scene], worlds, **options): the recording's time step, episodes from
+start_step to the end of the recording, no walls, no parked cars, no early end of episodes, and unscaled dynamics.
 
-All other given options are kept, for instance those of a pictura.PolicySession: scene.world(**session.training_world()).)")
+Other options in kwargs are kept, for example those of a pictura.PolicySession: scene.world(**session.training_world()).)")
       .def(
           "save",
           [](const RecordedScene& self, const std::string& path) {
@@ -351,9 +367,9 @@ All other given options are kept, for instance those of a pictura.PolicySession:
             write_scene_file(path, *self.scenario());
           },
           py::arg("path"),
-          R"(Writes the scene, completely or not at all, as *.scenario, which load() reads back to the bit.
+          R"(Writes the scene to a file *.scenario, completely or not at all. load() restores exactly the same scene.
 
-Raises pictura.UsageError for another ending, pictura.Error naming the file.)")
+Raises pictura.UsageError for another file extension, and pictura.Error if the file cannot be written.)")
       .def(
           "draw",
           [](const RecordedScene& self, int width_px, int height_px) {
@@ -365,11 +381,13 @@ Raises pictura.UsageError for another ending, pictura.Error naming the file.)")
 Sizes from 16 to 8192 px.)")
       .def(
           "inverse_actions", inverse_actions_of, py::arg("num_threads") = 0,
-          R"(Computes the actions with which the simulator's dynamics follow the recording most closely, as NumPy arrays by name.
+          R"(Computes the actions with which the simulator's dynamics follow the recording most closely. Returns NumPy arrays by
+name.
 
-actions int32, is_followed bool and error_m float32 [tracks, steps from start_step on]: for the step after each state the
-action, whether its start and end states are recorded, and the distance of its end from the recorded position. num_threads: 0
-for all.)")
+The arrays are [tracks, steps from start_step on], with a value for the step after each state. actions int32: the
+action. is_followed bool: whether the states before and after the step are recorded. error_m float32: distance between
+the simulated and the recorded position after the step.
+num_threads: number of CPU threads; 0: all.)")
       .def("__repr__", [](const RecordedScene& self) {
         const Scenario& scenario = *self.scenario();
         return fmt::format("<pictura.Scenario {} ({}): {} tracks, {} steps, from step {}>", scenario.id,
@@ -377,8 +395,8 @@ for all.)")
       });
 
   py::class_<PySceneRecorder, std::shared_ptr<PySceneRecorder>>(module, "SceneRecorder", R"(
-Records the present episode of a world of a simulator on the CPU as a scene: every step from now on, by any function, as long as
-the recorder lives.
+Records the current episode of one world as a scene. The simulator must be on the CPU. While the recorder exists, it
+records every step of the simulator, by any function.
 
 Examples:
     >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
@@ -395,14 +413,14 @@ Examples:
              return recorder;
            }),
            py::arg("simulator"), py::kw_only(), py::arg("world") = 0, py::keep_alive<1, 2>(),
-           "Raises pictura.UsageError if the world does not exist or the simulator is on a device.")
-      .def_property_readonly("num_steps", &PySceneRecorder::num_steps, "Number of steps so far.")
+           "Raises pictura.UsageError if the world does not exist or the simulator is on CUDA.")
+      .def_property_readonly("num_steps", &PySceneRecorder::num_steps, "Number of recorded steps.")
       .def(
           "scenario", &PySceneRecorder::scenario, py::kw_only(), py::arg("id") = "", py::arg("self_agent") = -1,
-          R"(Returns the pictura.Scenario recorded so far: controlled agents and parked cars as tracks, with the number of their box in the
-world as id, and lights as recorded lights.
+          R"(Returns the pictura.Scenario recorded so far. Its tracks are the controlled agents and the parked cars of the world; a
+track's id is the index of its box in the world. The world's lights are its recorded lights.
 
-self_agent: agent of the world whose track becomes the self-driving car's; -1: none. Raises pictura.UsageError for an agent that
+self_agent: agent whose track is marked as the self-driving car; -1: none. Raises pictura.UsageError for an agent that
 was never present.)");
   py::list types;
   for (int i = 0; i <= static_cast<int>(TrackType::other); ++i) types.append(to_string(static_cast<TrackType>(i)));

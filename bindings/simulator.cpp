@@ -92,7 +92,7 @@ Examples:
       .def_readonly("truncated", &StepArraysOfPython::truncated,
                     "bool [slots]: the episode ended for another reason: bootstrap.")
       .def_readonly("valid", &StepArraysOfPython::valid,
-                    "bool [slots]: the agent was active when the step began: learn from it.")
+                    "bool [slots]: the agent was active when the step began, so training may use the transition.")
       .def_readonly("refusal", &StepArraysOfPython::refusal,
                     "uint8 [slots]: reason why the agent is absent from this episode: 1 no place, 2 all places taken; "
                     "0: it is present.")
@@ -126,40 +126,46 @@ void define_construction(py::class_<PySimulator>* simulator) {
         return std::make_unique<PySimulator>(arguments.executor, arguments.config, arguments.maps,
                                              worlds_of(arguments.worlds), stream_of(arguments.stream));
       },
-      R"(Simulators of worlds on maps, at the start of their first episodes. Defaults are the paper's training world.
+      R"(Creates a simulator whose worlds are at the start of their first episodes. Defaults are those of the paper's training
+world.
 
 Args:
     maps: Maps of the worlds.
-    worlds: One (index of the map, agents) or (map, agents, global world) a world; the global world keys its random numbers.
+    worlds: A tuple (index of the map, number of agents) or (index, number, global world) for each world. The global
+        world, an int, keys the world's random numbers.
     executor: 'cpu', 'cuda' or 'auto'.
     device: Memory of observations and scenes: 'cpu', 'cuda' or 'cuda:INDEX'.
     seed: Seed of all random numbers.
-    num_threads: Threads of the host; 0: all.
+    num_threads: Number of CPU threads; 0: all.
     dt_s: Length of a step in seconds.
     episode_steps: Steps after which a world's episode ends.
-    reset_inactive_fraction: A world's episode ends when this share of its agents is inactive; more than 1: never.
+    reset_inactive_fraction: A world's episode ends when this share of its agents is inactive; a value over 1 disables
+this.
     pedestrian_fraction: Share of pedestrians among the agents.
     cyclist_fraction: Share of cyclists among the agents.
-    parked_cars: Parked cars of each world and episode.
-    light_cycles: 'phases', lights of a junction take turns, or 'independent', each light cycles alone.
+    parked_cars: Number of parked cars in each world.
+    light_cycles: 'phases': lights of a junction take turns. 'independent': each light has its own cycle.
     walls: Whether buildings stand along the roads.
-    wall_seed: Draws the heights of walls.
-    light_heads: 'as_mapped', or 'visible': heads beside or before their stop line stand 10 m beyond it, 3.5 m high.
-    wall_observations: Whether the set `walls` is observed.
-    reset_at_standstill: Accelerations end where the speed changes its sign.
-    blind: Share of agents that see no other road user for some seconds. Impaired agents are drawn per episode and never valid.
-    phantom_braking: Share of agents that brake hard for some seconds.
-    inattentive: Share of agents that see no traffic light.
-    stagger_episodes: The first episode of each world ends after a drawn number of steps.
-    fixed_lights: Lights are green, yellow and red for 10, 3 and 2 s, as in evaluations; else times are drawn per episode.
-    auxiliary_observations: Whether auxiliary slots of observations are filled.
+    wall_seed: Random seed of the heights of walls.
+    light_heads: Positions of light heads. 'as_mapped': as in the map. 'visible': heads beside or before their stop line
+are moved 10 m beyond it, 3.5 m high.
+    wall_observations: Whether the entity set `walls` is observed.
+    reset_at_standstill: Whether accelerations become 0 when the speed changes its sign.
+    blind: Share of agents that see no other road users for some seconds. These and the next two kinds of impaired
+        agents are drawn at random in each episode; their transitions are never valid.
+    phantom_braking: Share of agents that brake hard for some seconds without a reason.
+    inattentive: Share of agents that see no traffic lights.
+    stagger_episodes: Whether the first episode of each world ends after a random number of steps.
+    fixed_lights: Whether lights are green, yellow and red for 10, 3 and 2 s, as in evaluations. Otherwise durations are
+        random in each episode.
+    auxiliary_observations: Whether auxiliary numbers, which no image shows, are observed.
     vector_observations: Whether the entity sets are observed.
-    conditioning: A number or (low, high) by name of CONDITIONING_NAMES; the paper's ranges otherwise.
+    conditioning: A number or a range (low, high) for names in CONDITIONING_NAMES; other names have the paper's ranges.
     stream: A cudaStream_t as int; None: the legacy default stream.
 
 Raises:
-    pictura.UsageError: Names what cannot be simulated.
-    pictura.Error: There is no such device.)");
+    pictura.UsageError: An argument is invalid; the message names it.
+    pictura.Error: The device does not exist.)");
   (*simulator)
       .def("_inside",
            [](PySimulator& self) {
@@ -182,7 +188,7 @@ Raises:
             }
             return worlds;
           },
-          py::doc("(map, agents, global world) of each."))
+          py::doc("(index of the map, number of agents, global world) of each world."))
       .def_property_readonly("num_worlds", [](PySimulator& self) { return self.simulator().worlds().size(); })
       .def_property_readonly("num_slots", [](PySimulator& self) { return self.simulator().num_slots(); })
       .def_property_readonly("seed", [](PySimulator& self) { return self.simulator().config().seed; })
@@ -191,7 +197,7 @@ Raises:
       .def_property(
           "stream", [](const PySimulator& self) { return reinterpret_cast<intptr_t>(self.stream().handle); },
           [](PySimulator& self, const py::object& stream) { self.set_stream(stream_of(stream)); },
-          py::doc("cudaStream_t of the work, as int; 0: the legacy default stream."));
+          py::doc("The cudaStream_t on which work is enqueued, as int; 0: the legacy default stream."));
 }
 
 // Defines methods that change the state or compute hypothetical observations.
@@ -202,73 +208,86 @@ void define_steps(py::class_<PySimulator>* simulator) {
           [](PySimulator& self, const std::vector<std::shared_ptr<Map>>& maps, const py::sequence& worlds,
              uint64_t seed) { self.set_worlds(maps, worlds_of(worlds), seed); },
           py::arg("maps"), py::arg("worlds"), py::arg("seed") = 0,
-          R"(Replaces the worlds by other worlds on other maps, at the start of their first episodes, as in a new simulator. Get the arrays
-again afterwards: previous arrays remain valid memory, which later calls may write. Raises as the constructor does.)")
-      .def(
-          "reset", &PySimulator::reset, py::arg("world_mask") = py::none(), py::arg("seed") = py::none(),
-          R"(Starts new episodes. world_mask: uint8 or bool [worlds] in the simulator's memory, the worlds to reset; default: all. seed:
-their seed from now on; default: the simulator's own. Raises pictura.Error for another array.)")
-      .def(
-          "step", &PySimulator::step, py::arg("actions"),
-          R"(Advances every world by one step. actions: int32 [slots] in the simulator's memory, each in [0, 12): 3 times the index of the
-longitudinal jerk (-15, -4, 0, 4 m/s3) plus the index of the lateral jerk (-4, 0, 4 m/s3, left positive). Actions of inactive
-agents are ignored. A world whose last step ended its episode starts the next one instead, and its slots are not valid. Returns
-the StepResult. Raises pictura.Error, which leaves the state unchanged, for another array and for actions out of range.)")
+          R"(Replaces all worlds by other worlds on other maps, at the start of their first episodes. Afterwards get the simulator's
+arrays again: arrays from before this call remain valid memory, but later calls may overwrite them. Raises the same
+errors as the constructor.)")
+      .def("reset", &PySimulator::reset, py::arg("world_mask") = py::none(), py::arg("seed") = py::none(),
+           R"(Starts new episodes.
+
+world_mask: uint8 or bool [worlds] in the simulator's memory, true for worlds to reset; default: all worlds.
+seed: seed of these worlds from now on; default: the simulator's seed.
+Raises pictura.Error for a mask of another shape, type or device.)")
+      .def("step", &PySimulator::step, py::arg("actions"),
+           R"(Advances every world by one step. Returns the StepResult.
+
+actions: int32 [slots] in the simulator's memory, in [0, 12). An action is 3 times the index of the longitudinal jerk
+(-15, -4, 0, 4 m/s3) plus the index of the lateral jerk (-4, 0, 4 m/s3, left is positive). Actions of inactive agents
+are ignored.
+If the previous step ended a world's episode, this step starts the world's next episode instead, and its slots are not
+valid.
+Raises pictura.Error for an array of another shape, type or device, and for actions out of range; the state is then
+unchanged.)")
       .def(
           "step_commands", &PySimulator::step_commands, py::arg("commands"),
-          R"(Advances every world by one step with commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the
-episode, 3 as recorded, in worlds of a pictura.Scenario. Returns and raises as step() does.)")
-      .def(
-          "set_state", &PySimulator::set_state, py::arg("slots"), py::arg("fields"),
-          R"(Sets fields of agents. slots: int32 [n], each once. fields: arrays [n] or [n, per agent] by the names of AGENT_FIELDS, of their
-types, all in the simulator's memory. Lane, height, box, view and observation are updated. Raises pictura.Error naming an
-invalid value; on CUDA values are checked as in step().)")
+          R"(Advances every world by one step with commands, COMMAND_DTYPE [slots]. The kinds of commands are 0: an action; 1: a
+kinematic state; 2: absence for the rest of the episode; 3: the recorded state, in worlds of a pictura.Scenario. Returns
+and raises the same as step().)")
+      .def("set_state", &PySimulator::set_state, py::arg("slots"), py::arg("fields"),
+           R"(Sets fields of agents, and updates their lanes, heights, boxes, views and observations.
+
+slots: int32 [n], without duplicates. fields: arrays [n] or [n, numbers per agent], with names and types of
+AGENT_FIELDS. All arrays must be in the simulator's memory. Raises pictura.Error, which names an invalid value. On CUDA,
+invalid values raise the error in check() or a later call.)")
       .def(
           "observe", &PySimulator::observe, py::arg("queries"), py::arg("hidden") = py::none(),
           py::arg("inserted") = py::none(), py::kw_only(), py::arg("out") = py::none(),
-          R"(Returns the observations of slots if boxes of their worlds were absent, and other boxes present. Only partners differ; the state
-is unchanged. pictura.make_queries() creates the arguments:
-queries: QUERY_DTYPE [n], or uint8 [n, 24]: a slot, its ranges [begin, end) of the lists `hidden` and `inserted`, and
-leaves_gaps. 0: hidden partners are replaced by boxes that were too far away; 1: rows of zeros replace them.
-hidden: int32 [m], indices into the scene's boxes. inserted: INSERTED_DTYPE [k], or uint8 [k, 40]: a box of BOX_DTYPE and its
-speed_mps. out: arrays of the caller by the names of `observations`, with n in place of the slots; default: new arrays. All
-arrays are in the simulator's memory. Returns out, arrays by name. Raises pictura.Error naming an invalid array or query, and
-then writes nothing; on CUDA queries are checked as in step().)");
+          R"(Returns hypothetical observations, in which some boxes of the world are hidden and other boxes are inserted. Only the
+entity set `partners` differs from the actual observation. The state is unchanged. pictura.make_queries() creates the
+first three arguments. All arrays must be in the simulator's memory.
+
+queries: QUERY_DTYPE [n], or uint8 [n, 24]: for each query the observing slot, its ranges [begin, end) in `hidden` and
+`inserted`, and leaves_gaps. If leaves_gaps is 0, boxes further away replace hidden partners; if it is 1, rows of zeros
+replace them.
+hidden: int32 [m], indices into the scene's boxes.
+inserted: INSERTED_DTYPE [k], or uint8 [k, 40]: a box of BOX_DTYPE and its speed_mps.
+out: arrays [n, ...] for the results, with the names of `observations`; default: new arrays.
+Returns out. Raises pictura.Error, which names an invalid array or query; then nothing is written. On CUDA, invalid
+queries raise the error in check() or a later call.)");
 }
 
 // Defines the arrays of the current state.
 void define_arrays(py::class_<PySimulator>* simulator) {
   (*simulator)
+      .def_property_readonly("observations", &PySimulator::observations,
+                             py::doc("Observations of the current state, arrays [slots, ...] by name: ego, partners, "
+                                     "lanes, boundaries, controls, walls, set_counts, conditioning, waypoints."))
       .def_property_readonly(
-          "observations", &PySimulator::observations,
-          py::doc("Arrays [slots, ...] by name, of the state after the last call: ego, partners, lanes, "
-                  "boundaries, controls, walls, set_counts, conditioning, waypoints."))
-      .def_property_readonly("state", &PySimulator::state,
-                             py::doc("Every field of the agents by name, read-only, [slots] or [slots, per agent]."))
+          "state", &PySimulator::state,
+          py::doc("Fields of the agents by name, read-only arrays [slots] or [slots, numbers per agent]."))
       .def_property_readonly("scene", &PySimulator::scene, py::doc("Scene of all worlds, for renderers."))
       .def_property_readonly(
           "views", [](PySimulator& self) { return self.lend_structs<View>(self.simulator().views(), "views"); },
-          py::doc("One view per slot: uint8 [slots, 60] for render(); its fields are those of VIEW_DTYPE."))
+          py::doc("View of each slot for render(): uint8 [slots, 60] with the fields of VIEW_DTYPE."))
       .def_property_readonly(
           "episode_step",
           [](PySimulator& self) { return self.lend_span(self.simulator().episode_step(), "episode_step"); },
-          py::doc("int32 [worlds]: completed steps in the present episode."))
+          py::doc("int32 [worlds]: number of completed steps in the current episode."))
       .def_property_readonly(
           "episode_index",
           [](PySimulator& self) { return self.lend_span(self.simulator().episode_index(), "episode_index"); },
-          py::doc("int32 [worlds]: the number of the episode."))
+          py::doc("int32 [worlds]: index of the current episode."))
       .def_property_readonly(
           "episode_over",
           [](PySimulator& self) { return self.lend_span(self.simulator().episode_over(), "episode_over", true); },
-          py::doc("bool [worlds]: the episode has ended, and the next step begins the next one."))
+          py::doc("bool [worlds]: whether the episode has ended; the next step then begins the next episode."))
       .def_property_readonly(
           "world_of_slot",
           [](PySimulator& self) { return self.lend_span(self.simulator().slots().world_of_slot, "world_of_slot"); },
-          py::doc("int32 [slots]."))
+          py::doc("int32 [slots]: index of the slot's world."))
       .def_property_readonly(
           "agent_of_slot",
           [](PySimulator& self) { return self.lend_span(self.simulator().slots().agent_of_slot, "agent_of_slot"); },
-          py::doc("int32 [slots]: the agent's index in its world."));
+          py::doc("int32 [slots]: index of the slot's agent in its world."));
 }
 
 // Defines methods that return counts or copies of the state.
@@ -280,28 +299,28 @@ void define_totals_and_copies(py::class_<PySimulator>* simulator) {
             return report_of(
                 self.calls().run("spawn_report", [&] { return self.simulator().spawn_report(self.stream()); }));
           },
-          "Returns counts by name of requested, spawned, refused, entered and left agents, and of parked cars. Waits "
-          "for the stream.")
+          "Returns the numbers of requested, spawned, refused, entered and left agents and of parked cars, by name. "
+          "Waits for the stream.")
       .def(
           "totals",
           [](PySimulator& self) {
             return dict_of(
                 self.calls().run("totals", [&] { return SimulatorTotals(self.simulator().totals(self.stream())); }));
           },
-          "Returns counts and sums since construction by name; reward_terms is a dict. Waits for the stream.")
+          "Returns counts and sums since construction, by name. `reward_terms` is a dict. Waits for the stream.")
       .def(
           "state_hash",
           [](PySimulator& self) {
             return self.calls().run("state_hash", [&] { return self.simulator().state_hash(self.stream()); });
           },
-          "Returns 64 bits over the complete state, equal on every executor. Waits for the stream.")
+          "Returns a 64-bit hash of the complete state, which is equal on all executors. Waits for the stream.")
       .def(
           "save",
           [](PySimulator& self) {
             const auto bytes = self.calls().run("save", [&] { return self.simulator().save(self.stream()); });
             return py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
           },
-          "Returns the complete state as bytes, for exact resume on any executor. Waits for the stream.")
+          "Returns the complete state as bytes, from which any executor can resume exactly. Waits for the stream.")
       .def(
           "restore",
           [](PySimulator& self, const py::bytes& saved) {
@@ -311,24 +330,26 @@ void define_totals_and_copies(py::class_<PySimulator>* simulator) {
                   Span<const uint8_t>(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()), self.stream());
             });
           },
-          py::arg("saved"), "Restores a saved state. Raises pictura.Error naming the difference.")
+          py::arg("saved"),
+          "Restores a state of save(). Raises pictura.Error if the state is of other worlds; the message names the "
+          "difference.")
       .def(
           "restore",
           [](PySimulator& self, const Snapshot& snapshot) {
             PICTURA_CHECK(snapshot.of == self.shared(), "restore: expected a snapshot of this simulator");
             self.calls().run("restore", [&] { self.simulator().restore(*snapshot.state, self.stream()); });
           },
-          py::arg("snapshot"), "Restores a snapshot of these worlds; on CUDA without waiting.")
+          py::arg("snapshot"), "Restores a snapshot of these worlds. On CUDA it does not wait for the stream.")
       .def(
           "snapshot",
           [](PySimulator& self) {
             return std::make_unique<Snapshot>(Snapshot{
                 self.shared(), self.calls().run("snapshot", [&] { return self.simulator().snapshot(self.stream()); })});
           },
-          "Returns a copy of the state in the simulator's memory.")
+          "Returns a copy of the state. The copy is in the simulator's memory.")
       .def(
           "check", [](PySimulator& self) { self.calls().run("check", [&] { self.simulator().check(self.stream()); }); },
-          "Waits for the work on the stream; raises pictura.Error for errors found by a device.");
+          "Waits for the work on the stream. Raises pictura.Error for errors that CUDA kernels have found.");
 }
 
 // Defines methods that draw a world or take many steps.
@@ -337,12 +358,13 @@ void define_drawing_and_loops(py::class_<PySimulator>* simulator) {
       .def(
           "draw", &PySimulator::draw, py::arg("world") = 0, py::arg("agent") = -1, py::kw_only(),
           py::arg("width_px") = 640, py::arg("height_px") = 480, py::arg("width_m") = 150.0f,
-          R"(Draws a world from above, uint8 [height, width, 3], on the CPU. agent: agent of that world in the middle, shown with its
-waypoints; -1 shows the whole map. width_m: width of the shown surroundings.)")
+          R"(Draws a world from above on the CPU. Returns uint8 [height, width, 3]. agent: agent of this world in the middle, with
+its waypoints; -1: the whole map. width_m: width of the drawn area in metres, if there is an agent.)")
       .def(
           "run", [](PySimulator& self, PyController& controller, int64_t steps) { self.run(controller, steps); },
           py::arg("controller"), py::arg("steps"),
-          "Takes steps with a controller for all agents. ^C ends the call between steps.")
+          "Advances every world by `steps` steps, with a controller for all agents. ^C ends the call between two "
+          "steps.")
       .def(
           "time_steps",
           [](PySimulator& self, const py::object& actions, int64_t steps) {
@@ -354,7 +376,7 @@ waypoints; -1 shows the whole map. width_m: width of the shown surroundings.)")
             return std::chrono::duration<double>(Clock::now() - begin).count();
           },
           py::arg("actions"), py::arg("steps"),
-          R"(Returns the seconds of this number of steps with the same actions, called from C++, for measurements of Python's overhead in
+          R"(Executes steps with the same actions from C++. Returns the duration in seconds, for measurements of Python's overhead in
 step().)")
       .def_property_readonly(
           "geometries",
@@ -367,7 +389,7 @@ step().)")
             }
             return geometries;
           },
-          py::doc("Geometries of its maps, by their handles in the scene."));
+          py::doc("Geometries of the maps, by their handles in the scene."));
 }
 
 void bind_functions(py::module_& module) {
@@ -382,7 +404,8 @@ void bind_functions(py::module_& module) {
       },
       py::arg("seed"), py::arg("num_slots"), py::arg("min_agents"), py::arg("max_agents"), py::arg("num_maps"),
       R"(
-Draws worlds of sizes from U{min, max} until they fill the slots; they use the maps in turn.
+Draws random worlds until they fill the slots. The number of agents of a world is uniform in [min_agents, max_agents].
+Worlds use the maps in turn. Returns (index of the map, number of agents, global world) of each world.
 
 Examples:
     >>> worlds = pictura.draw_worlds(seed=1, num_slots=100, min_agents=5, max_agents=40, num_maps=2)
@@ -402,7 +425,7 @@ void bind_simulator(py::module_& module) {
   bind_names(module);
   bind_step_result(module);
   py::class_<Snapshot>(module, "Snapshot", R"(
-State that a simulator keeps in its own memory.
+Copy of a simulator's state in the simulator's memory, from Simulator.snapshot().
 
 Examples:
     >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
@@ -416,8 +439,11 @@ Examples:
   py::class_<SimulatorInside>(module, "_SimulatorInside");
   py::class_<ControllerInside>(module, "_ControllerInside");
   py::class_<PyController> controller_class(module, "Controller", R"(
-Driver in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
-worlds of recorded scenes 'log', 'inverse' or 'idm', a policy of a pictura.PolicySession, or several of these.
+Controller of the agents in one simulator on the CPU.
+
+Controllers by name are 'lane' (follows lanes), 'idm_lanes' (follows lanes and keeps a distance to vehicles ahead),
+'idle' and 'random', and in recorded scenes 'log', 'inverse' and 'idm'. pictura.PolicySession makes controllers with a
+policy; shared() combines several controllers.
 
 Examples:
     >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
@@ -426,11 +452,13 @@ Examples:
     >>> commands['action'].shape
     (8,))");
   py::class_<PySimulator> simulator_class(module, "Simulator", R"(
-Many worlds, each on one map, stepped together. Arrays have one element per slot: the controlled agents of world 0, then those
-of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.
+Many worlds, each on one map, which advance together. Arrays have one element for each slot: first for the controlled
+agents of world 0, then for the controlled agents of world 1, and so on. Results of the executors 'cpu' and 'cuda' are
+equal bit for bit.
 
-One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is enqueued on
-`stream`, calls return before it is done, and invalid values raise an error in check() or a later call.
+Only one thread at a time may use a simulator; different simulators are independent. The GIL is released while C++ code
+runs. On CUDA, work is enqueued on `stream`, and calls return before the work is done. Invalid values then raise an
+error in check() or a later call.
 
 Examples:
     >>> town = pictura.Map.load('procedural:3')

@@ -19,11 +19,11 @@ class UsageError(Error, ValueError):
 class Array:
     """
     Array in the library's memory, lent without a copy.
-    
-    NumPy accesses it with `numpy.asarray(array)` if it is on the CPU; `numpy.from_dlpack`, `torch.from_dlpack`, JAX and CuPy access
-    it on any device. The memory lives as long as any of these references, even after its simulator or renderer is gone. Its
-    contents change with the calls that write it.
-    
+
+    On the CPU, `numpy.asarray(array)` returns a NumPy view. On any device, DLPack gives access: `torch.from_dlpack`,
+    `numpy.from_dlpack`, JAX and CuPy. The memory remains allocated while any reference to it exists, even after its
+    simulator or renderer is deleted. Later calls of the simulator or renderer change the contents.
+
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
         >>> ego = simulator.observations['ego']
@@ -36,7 +36,7 @@ class Array:
         ...
     def __dlpack__(self, *, stream: typing.Any = None, max_version: typing.Any = None, dl_device: typing.Any = None, copy: typing.Any = None) -> typing.Any:
         """
-        DLPack's protocol, versioned if max_version is (1, 0) or later. Raises BufferError if the array cannot be lent.
+        Returns a DLPack capsule, versioned if max_version is (1, 0) or later. Raises BufferError if the array cannot be exported.
         """
     def __dlpack_device__(self) -> tuple[int, int]:
         """
@@ -58,7 +58,7 @@ class Array:
         """
     def torch(self) -> typing.Any:
         """
-        Returns a torch tensor over the same memory. Imports torch.
+        Returns a torch tensor that shares the memory. Imports torch.
         """
     @property
     def device(self) -> str:
@@ -78,7 +78,7 @@ class Array:
     @property
     def shape(self) -> tuple:
         """
-        Lengths, a tuple of int.
+        Lengths of the dimensions, a tuple of int.
         """
     @property
     def strides(self) -> tuple:
@@ -88,7 +88,7 @@ class Array:
 class Geometry:
     """
     Geometry of a map for renderers: strips on the road, walls, light heads.
-    
+
     Examples:
         >>> pictura.Map.load('procedural:3').geometry(walls=False).num_walls
         0
@@ -99,17 +99,17 @@ class Geometry:
     def __init__(self, lines: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float32], typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]]] = [], walls: typing.Annotated[numpy.typing.ArrayLike, numpy.float32] = ...) -> None:
         """
         Creates a custom geometry.
-        
-        lines: list of (points [n, 3] in metres, width in metres, colour of three numbers in [0, 1]).
-        walls: float [n, 7]: both ends of the foot, in metres, and the height.
-        Raises pictura.Error for other shapes; renderers reject numbers that are not finite.
+
+        lines: list of (points [n, 3] in metres, width in metres, RGB colour with values in [0, 1]).
+        walls: float [n, 7]: both ends of a wall on the ground (x, y, z, x, y, z) and its height, in metres.
+        Raises pictura.Error for other shapes. Renderers reject numbers that are not finite.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
     @property
     def num_lights(self) -> int:
         """
-        Number of light states of a world with this geometry.
+        Number of traffic light states in each world with this geometry.
         """
     @property
     def num_strips(self) -> int:
@@ -123,10 +123,10 @@ class Geometry:
         """
 class Map:
     """
-    Road network: lanes, markings, edges, lights. Immutable; simulators and renderers share it.
-    
-    Positions are metres in the map's frame, z up; `origin_m` is the frame's origin in the file's coordinates.
-    
+    Road network: lanes, markings, edges and traffic lights. A map is immutable, so simulators and renderers can share it.
+
+    Positions are in metres in the map's frame, with z up. `origin_m` is the origin of this frame in the file's coordinates.
+
     Examples:
         >>> town = pictura.Map.load('procedural:3')                # or 'Town01', 'city:1', 'mytown.xodr'
         >>> town.name, town.draw(320, 200).shape
@@ -137,17 +137,19 @@ class Map:
     @staticmethod
     def from_text(text: str, source: str = 'text', *, strict: bool = False) -> Map:
         """
-        Parses the text of an OpenDRIVE file; `source` is its name in messages. Raises as load() does.
+        Parses the text of an OpenDRIVE file. source: name of the text in error messages. Raises the same errors as load().
         """
     @staticmethod
     def load(name: str, *, strict: bool = False, chord_error_m: typing.SupportsFloat | typing.SupportsIndex = 0.019999999552965164) -> Map:
         """
-        Loads a map by name: an OpenDRIVE file (.xodr), a Lanelet2 file (.osm, or .osm@LATITUDE,LONGITUDE in coordinates about
-        that place), a town of the map folder, 'procedural:SEED', or 'city:SEED'.
-        
-        Faults with a single sensible meaning are repaired and listed in `mends`. strict: rejects such faults too. chord_error_m:
-        maximum distance of sampled curves from the true curves.
-        Raises pictura.Error naming file, line and element; pictura.UsageError if the map does not exist.
+        Loads or generates a map by name: an OpenDRIVE file (.xodr), a Lanelet2 file (.osm), a town in the folder map_folder(),
+        'procedural:SEED', or 'city:SEED'. For FILE.osm@LATITUDE,LONGITUDE this place is the origin of coordinates.
+
+        Faults of a file that have only one sensible repair are repaired, and listed in `mends`.
+        strict: rejects files with such faults instead.
+        chord_error_m: maximum distance in metres between a curve and the polyline that approximates it.
+        Raises pictura.Error, which names file, line and element, for an invalid file, and pictura.UsageError if the map does
+        not exist.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -155,11 +157,12 @@ class Map:
         ...
     def arrays(self) -> dict:
         """
-        Copies the network's geometry to NumPy arrays by name.
-        
-        lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length; lane_point_range int32 [lanes, 2] is each
-        lane's range of points. Ranges are half-open. lane_type uint8 [lanes] indexes pictura.LANE_TYPES; lane_links int32 lists
-        successors and predecessors; road_edges, stop_lines and building_lines float32 [n, 6] are two ends each. Lengths are metres.
+        Returns copies of the network's geometry as NumPy arrays by name. Lengths are in metres.
+
+        lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length. lane_point_range int32 [lanes, 2]: the
+        half-open range of each lane's points. lane_type uint8 [lanes]: indices into pictura.LANE_TYPES. lane_links int32:
+        successors and predecessors of all lanes. road_edges, stop_lines, building_lines float32 [n, 6]: both ends of each
+        segment.
         """
     def draw(self, width_px: typing.SupportsInt | typing.SupportsIndex = 1024, height_px: typing.SupportsInt | typing.SupportsIndex = 1024) -> numpy.typing.NDArray[numpy.uint8]:
         """
@@ -167,8 +170,8 @@ class Map:
         """
     def geometry(self, walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0, light_heads: str = 'as_mapped') -> Geometry:
         """
-        Returns the map's geometry for renderers. walls: adds walls along the building lines, with heights drawn from wall_seed.
-        light_heads: as for Simulator.
+        Returns the map's geometry for renderers. walls: adds walls along the building lines; wall_seed is the random seed of
+        their heights. light_heads: as for Simulator.
         """
     @property
     def facts(self) -> dict:
@@ -183,7 +186,7 @@ class Map:
     @property
     def mends(self) -> list[tuple[str, str, str]]:
         """
-        Repaired faults of the file: (kind, repair, message) each.
+        Repaired faults of the file, a tuple (kind, repair, message) for each.
         """
     @property
     def name(self) -> str:
@@ -193,15 +196,16 @@ class Map:
     @property
     def origin_m(self) -> typing.Annotated[list[float], "FixedSize(3)"]:
         """
-        File coordinates of the map's origin, three floats in metres.
+        The map's origin in the file's coordinates, three floats in metres.
         """
 class Scenario(Map):
     """
-    Recorded scene: a map, the tracks of all road users, and the recorded lights. Immutable.
-    
-    A scenario is the map of worlds whose agents are its tracks, in their order, from `start_step` on:
-    pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). Commands of kind 3 and the controller 'log' replay it.
-    
+    Recorded scene: a map, the tracks of all road users, and the recorded traffic lights. A scenario is immutable.
+
+    A simulator uses a scenario as the map of a world. The agents of this world are the tracks, in the same order, from
+    `start_step` on: pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). The controller 'log' and commands
+    of kind 3 replay the tracks.
+
     Examples:
         >>> scene = pictura.Scenario.load('drive.scenario')            # or FILE.tfrecord#7, FILE.json, a folder
         >>> simulator = pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world())
@@ -212,34 +216,46 @@ class Scenario(Map):
     @staticmethod
     def from_arrays(tracks: dict, lanes: dict, *, lines: dict | None = None, edges: dict | None = None, crosswalks: dict | None = None, stop_signs: dict | None = None, lights: dict | None = None, dt_s: typing.SupportsFloat | typing.SupportsIndex = 0.1, current_step: typing.SupportsInt | typing.SupportsIndex | None = None, sdc_track: typing.SupportsInt | typing.SupportsIndex | None = None, id: str = '', origin_m: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] | None = None, tolerance_m: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> Scenario:
         """
-        Creates a scene from arrays in dicts: NumPy arrays, or objects that convert to them. Lengths are metres, positions float64 in
-        any frame.
-        
-        tracks: id int64 [T], type [T] (index in pictura.TRACK_TYPES), size_m [T, 3] (length, width, height), valid bool [T, S],
-        position_m [T, S, 3] (of the box's foot), heading_rad [T, S], velocity_mps [T, S, 2]; states that are not valid may hold
-        anything.
-        Polylines are points float64 [P, 3], one polyline after the other, and begin int32 [N + 1], the offset of each polyline in the
-        points and the end of the last.
-        lanes: points and begin along the centre, id int64 [N] of 0 or more, type [N] (pictura.LANE_TYPES); if known speed_limit_mps [N]
-        (0: unknown), width_m [P] (all 0 along a lane: unknown), in_junction bool [N], entries and exits, ids of lanes one after the
-        other, with entries_begin and exits_begin [N + 1], left_neighbor and right_neighbor [N], ids of lanes of the same direction, or
-        -1. Without entries and exits, lanes are linked at common ends.
-        lines: points, begin, type [N] (pictura.LINE_TYPES). edges: points and begin, with the road on the left. crosswalks: points and
-        begin of their outlines. stop_signs: position_m [N, 3], lanes with lanes_begin. lights: lanes with lanes_begin [L + 1], states
-        [L, S] (pictura.LIGHT_STATES), and stop_lines [L, 2, 3]; by default stop lines cross the begins of the lanes.
-        dt_s: time between states. current_step: step of the present; None: 10, or the last step. sdc_track: index of the self-driving
-        car's track. origin_m: of the map, about which numbers are rounded to float32; None: the middle of lanes and edges. tolerance_m:
-        maximum deviation of lines when they are thinned; 0 keeps all points.
-        Raises pictura.UsageError naming the array and the element, pictura.Error if the arrays do not form a scene.
+        Creates a scene from dicts of NumPy arrays, or of objects that NumPy converts to arrays.
+
+        Lengths are in metres. Positions are float64 in any frame. Polylines are given by two arrays: points float64 [P, 3], the
+        points of all polylines one after the other, and begin int32 [N + 1], the index of each polyline's first point, followed
+        by P. Lists of ids are given in the same way, for example by lanes and lanes_begin.
+
+        Args:
+            tracks: id int64 [T]; type [T], indices into pictura.TRACK_TYPES; size_m [T, 3], length, width and height; valid
+                bool [T, S]; position_m [T, S, 3], centre of the box's foot; heading_rad [T, S]; velocity_mps [T, S, 2]. States
+                that are not valid may contain any numbers.
+            lanes: points and begin of centre lines; id int64 [N], 0 or more; type [N], indices into pictura.LANE_TYPES.
+                Optional: speed_limit_mps [N], 0 if unknown; width_m [P], all 0 along a lane of unknown width; in_junction bool
+                [N]; entries and exits, ids of linked lanes, with entries_begin and exits_begin [N + 1]; left_neighbor and
+                right_neighbor [N], ids of lanes of the same direction, or -1. Without entries and exits, lanes are linked where
+                their ends coincide.
+            lines: points, begin, and type [N], indices into pictura.LINE_TYPES.
+            edges: points and begin of road edges, with the road on their left.
+            crosswalks: points and begin of outlines.
+            stop_signs: position_m [N, 3]; lanes, ids of the controlled lanes, with lanes_begin [N + 1].
+            lights: lanes, ids of the controlled lanes, with lanes_begin [L + 1]; states [L, S], indices into
+                pictura.LIGHT_STATES; stop_lines [L, 2, 3], by default across the beginning of the lanes.
+            dt_s: Time between states in seconds.
+            current_step: Step of the present, at which the history ends. None: 10, or the last step if there are fewer.
+            sdc_track: Index of the self-driving car's track.
+            id: Id of the scene.
+            origin_m: Origin of the map's frame, in which positions are rounded to float32. None: the middle of lanes and edges.
+            tolerance_m: Maximum deviation of polylines when points are removed. 0 keeps all points.
+
+        Raises:
+            pictura.UsageError: An array is invalid; the message names the array and the element.
+            pictura.Error: The arrays do not form a scene.
         """
     @staticmethod
     def load(name: str, *, start_step: typing.SupportsInt | typing.SupportsIndex = 0) -> Scenario:
         """
-        Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of these; '#7' or
-        '#SCENARIO_ID' selects one of several scenes.
-        
+        Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of such
+        files. A suffix '#7' or '#SCENARIO_ID' selects one of several scenes.
+
         start_step: step of the recording at which episodes begin.
-        Raises pictura.Error naming file, record and field; pictura.UsageError if the scene or step does not exist.
+        Raises pictura.Error, which names file, record and field, and pictura.UsageError if the scene or step does not exist.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -248,66 +264,71 @@ class Scenario(Map):
     def draw(self, width_px: typing.SupportsInt | typing.SupportsIndex = 1024, height_px: typing.SupportsInt | typing.SupportsIndex = 1024) -> numpy.typing.NDArray[numpy.uint8]:
         """
         Draws the scene from above, uint8 [height, width, 3], north up: the paths of all tracks, and the road users at start_step.
-        
+
         Sizes from 16 to 8192 px.
         """
     def inverse_actions(self, num_threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
         """
-        Computes the actions with which the simulator's dynamics follow the recording most closely, as NumPy arrays by name.
-        
-        actions int32, is_followed bool and error_m float32 [tracks, steps from start_step on]: for the step after each state the
-        action, whether its start and end states are recorded, and the distance of its end from the recorded position. num_threads: 0
-        for all.
+        Computes the actions with which the simulator's dynamics follow the recording most closely. Returns NumPy arrays by
+        name.
+
+        The arrays are [tracks, steps from start_step on], with a value for the step after each state. actions int32: the
+        action. is_followed bool: whether the states before and after the step are recorded. error_m float32: distance between
+        the simulated and the recorded position after the step.
+        num_threads: number of CPU threads; 0: all.
         """
     def mask(self, words: str, *, absent: bool = False) -> numpy.typing.NDArray[numpy.uint8]:
         """
-        Returns uint8 [tracks]: 1 for the tracks that comma-separated words select: self (the self-driving car), vehicles (the others),
-        others (all non-vehicles), all, tracks_to_predict, objects_of_interest, and ids of tracks.
-        
-        absent: includes tracks that are absent at start_step. Raises pictura.UsageError for another word, and if no track remains.
+        Returns a mask uint8 [tracks], which is 1 for selected tracks.
+
+        words: comma-separated list of self (the self-driving car), vehicles (all other vehicles), others (all non-vehicles),
+        all, tracks_to_predict, objects_of_interest, and ids of tracks.
+        absent: also selects tracks that are absent at start_step.
+        Raises pictura.UsageError for an unknown word, and if no track is selected.
         """
     def save(self, path: str) -> None:
         """
-        Writes the scene, completely or not at all, as *.scenario, which load() reads back to the bit.
-        
-        Raises pictura.UsageError for another ending, pictura.Error naming the file.
+        Writes the scene to a file *.scenario, completely or not at all. load() restores exactly the same scene.
+
+        Raises pictura.UsageError for another file extension, and pictura.Error if the file cannot be written.
         """
     def starting_at(self, start_step: typing.SupportsInt | typing.SupportsIndex) -> Scenario:
         """
-        Returns the same scene with episodes that begin at another step; nothing is copied.
-        
-        Raises pictura.UsageError for a step that the scene does not have.
+        Returns the same scene with another start step, without copying data.
+
+        Raises pictura.UsageError if the scene does not have this step.
         """
     def to_arrays(self) -> dict:
         """
-        Returns the arguments by name with which pictura.Scenario.from_arrays(**arrays) creates the same scene.
-        
-        The arrays do not contain: tracks to predict and tracks marked for replay, walls, parking spaces, signs other than stop signs,
-        widths of paint, and the data with which a saved run replays to the bit.
+        Returns a dict of arguments with which pictura.Scenario.from_arrays(**arrays) creates the same scene.
+
+        The result does not contain tracks to predict, tracks marked for replay, walls, parking spaces, signs other than stop
+        signs, widths of paint, and the data for bit-exact replay of a saved run.
         """
     def tracks(self) -> dict:
         """
-        Copies the tracks to NumPy arrays by name.
-        
-        id int64 [tracks], as in the file; type uint8 [tracks] indexes pictura.TRACK_TYPES; size_m float32 [tracks, 3]: length, width,
-        height. valid bool [tracks, steps]; position_m float32 [tracks, steps, 3], centre of the box's foot in the map's frame;
-        heading_rad [tracks, steps]; velocity_mps [tracks, steps, 2]: 0 where not valid.
+        Returns copies of the tracks as NumPy arrays by name.
+
+        id int64 [tracks]: ids in the file. type uint8 [tracks]: indices into pictura.TRACK_TYPES. size_m float32 [tracks, 3]:
+        length, width, height. valid bool [tracks, steps]: whether the state is recorded. position_m float32 [tracks, steps, 3]:
+        centre of the box's foot in the map's frame. heading_rad [tracks, steps]. velocity_mps [tracks, steps, 2]: 0 if
+        the state is not valid.
         """
     def with_recorded_lights(self) -> Scenario:
         """
-        Returns the same scene with worlds that use its recorded lights: they are drawn and observed, and red lights count.
+        Returns the same scene with its recorded lights enabled: worlds draw and observe them, and crossing a red light is an infraction.
         """
     def world(self, **kwargs) -> dict:
         """
-        Returns the options with which pictura.Simulator([scene], worlds, **options) creates the scene's worlds: the recording's time
-        step, an episode as long as the rest of the recording, no walls, no parked cars, no early end, plain dynamics.
-        
-        All other given options are kept, for instance those of a pictura.PolicySession: scene.world(**session.training_world()).
+        Returns the options for pictura.Simulator([scene], worlds, **options): the recording's time step, episodes from
+        start_step to the end of the recording, no walls, no parked cars, no early end of episodes, and unscaled dynamics.
+
+        Other options in kwargs are kept, for example those of a pictura.PolicySession: scene.world(**session.training_world()).
         """
     @property
     def current_step(self) -> int:
         """
-        Last step of the history that predictors are given.
+        Step of the present: the last step of the history that a predictor may use.
         """
     @property
     def dt_s(self) -> float:
@@ -332,7 +353,7 @@ class Scenario(Map):
     @property
     def notes(self) -> list:
         """
-        Elements that were dropped or changed when the file was converted: (what, how often, first place) each.
+        Elements that the conversion of the file dropped or changed: a tuple (kind, count, place of the first) for each kind.
         """
     @property
     def num_steps(self) -> int:
@@ -342,12 +363,12 @@ class Scenario(Map):
     @property
     def num_tracks(self) -> int:
         """
-        Number of agents of its worlds.
+        Number of tracks, and of agents in each of the scene's worlds.
         """
     @property
     def sdc_track(self) -> int | None:
         """
-        Track of the self-driving car; None if the file does not mark it.
+        Index of the self-driving car's track; None if the file does not mark it.
         """
     @property
     def start_step(self) -> int:
@@ -356,9 +377,9 @@ class Scenario(Map):
         """
 class SceneRecorder:
     """
-    Records the present episode of a world of a simulator on the CPU as a scene: every step from now on, by any function, as long as
-    the recorder lives.
-    
+    Records the current episode of one world as a scene. The simulator must be on the CPU. While the recorder exists, it
+    records every step of the simulator, by any function.
+
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
         >>> recorder = pictura.SceneRecorder(simulator)
@@ -369,28 +390,28 @@ class SceneRecorder:
     """
     def __init__(self, simulator: typing.Any, *, world: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
-        Raises pictura.UsageError if the world does not exist or the simulator is on a device.
+        Raises pictura.UsageError if the world does not exist or the simulator is on CUDA.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
     def scenario(self, *, id: str = '', self_agent: typing.SupportsInt | typing.SupportsIndex = -1) -> Scenario:
         """
-        Returns the pictura.Scenario recorded so far: controlled agents and parked cars as tracks, with the number of their box in the
-        world as id, and lights as recorded lights.
-        
-        self_agent: agent of the world whose track becomes the self-driving car's; -1: none. Raises pictura.UsageError for an agent that
+        Returns the pictura.Scenario recorded so far. Its tracks are the controlled agents and the parked cars of the world; a
+        track's id is the index of its box in the world. The world's lights are its recorded lights.
+
+        self_agent: agent whose track is marked as the self-driving car; -1: none. Raises pictura.UsageError for an agent that
         was never present.
         """
     @property
     def num_steps(self) -> int:
         """
-        Number of steps so far.
+        Number of recorded steps.
         """
 class Camera:
     """
-    Pinhole camera on a body: x forward, y left, z up, in metres from the rig's origin. Angles are radians: yaw is
-    counter-clockwise, positive pitch looks up, positive roll is clockwise as seen from behind.
-    
+    Pinhole camera on a body. Its position is in metres from the rig's origin: x forward, y left, z up. Angles are in
+    radians. Positive yaw is counter-clockwise, positive pitch looks up, and positive roll is clockwise as seen from behind.
+
     Examples:
         >>> roof = pictura.Camera('roof', 128, 72, position_m=(1.0, 0.0, 1.6), pitch_rad=-0.1)
         >>> roof.focal_x_px
@@ -401,7 +422,7 @@ class Camera:
         ...
     def __init__(self, name: str, width_px: typing.SupportsInt | typing.SupportsIndex, height_px: typing.SupportsInt | typing.SupportsIndex, *, focal_px: typing.SupportsFloat | typing.SupportsIndex | None = None, position_m: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] = [1.5, 0.0, 1.5], yaw_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0, pitch_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0, roll_rad: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
-        The principal point is the middle; focal_px defaults to 0.8 times the width, about 64 degrees across.
+        The principal point is the middle of the image. The default of focal_px is 0.8 times the width, a horizontal field of view of about 64 degrees.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -471,8 +492,8 @@ class Camera:
         ...
 class Rig:
     """
-    One or more cameras of any sizes on a body, in the order of images.
-    
+    One or more cameras on a body, in the order of their images. Cameras may have different image sizes.
+
     Examples:
         >>> [camera.name for camera in pictura.Rig.paper(96, 54).cameras]
         ['front', 'front_left', 'front_right', 'back']
@@ -482,7 +503,7 @@ class Rig:
     @staticmethod
     def load(path: str) -> Rig:
         """
-        Reads a rig from a TOML file. Raises pictura.Error naming file, camera and key.
+        Reads a rig from a TOML file. Raises pictura.Error, which names file, camera and key.
         """
     @staticmethod
     def paper(width_px: typing.SupportsInt | typing.SupportsIndex = 96, height_px: typing.SupportsInt | typing.SupportsIndex = 54, square_pixels: bool = False) -> Rig:
@@ -493,7 +514,7 @@ class Rig:
         ...
     def __init__(self, cameras: collections.abc.Sequence[Camera]) -> None:
         """
-        Raises pictura.Error unless there are 1 to 64 valid cameras.
+        Creates a rig of 1 to 64 cameras. Raises pictura.Error for another number or an invalid camera.
         """
     def __len__(self) -> int:
         ...
@@ -506,9 +527,9 @@ class Rig:
         ...
 class Scene:
     """
-    Moving objects: boxes of agents and states of lights, for one or more worlds. A simulator's `scene` follows the simulator; a
-    scene of arrays is a copy of the arrays.
-    
+    Dynamic objects of one or more worlds: boxes of agents and states of traffic lights. Simulator.scene always shows the
+    simulator's current state. A scene created from arrays has a copy of them.
+
     Examples:
         >>> car = pictura.Scene(center_m=[[12, 0, 0]], heading_rad=[0], size_m=[[4.4, 1.8, 1.5]], agent_class=[0])
         >>> car.num_worlds, car.boxes.shape
@@ -516,27 +537,37 @@ class Scene:
     """
     def __init__(self, center_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], heading_rad: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], size_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], agent_class: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], *, world_begin: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, geometry: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, light_states: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, light_begin: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None) -> None:
         """
-        center_m [n, 3]: centre of the box's foot. heading_rad [n]. size_m [n, 3]: length, width, height. agent_class [n]: 0 vehicle, 1
-        cyclist, 2 pedestrian. world_begin [worlds + 1]: first box of each world; default: a single world. geometry [worlds]: handles of
-        uploaded geometries; default: 0. light_states: 0 off, 1 red, 2 yellow, 3 green, 4 unknown, of all worlds; light_begin [worlds +
-        1]. Raises pictura.Error for other shapes; render() rejects arrays that do not fit together.
+        Creates a scene from arrays.
+
+        Args:
+            center_m: [n, 3], centres of the boxes' feet, in metres.
+            heading_rad: [n], headings in radians.
+            size_m: [n, 3], length, width and height of boxes, in metres.
+            agent_class: [n], 0 vehicle, 1 cyclist, 2 pedestrian.
+            world_begin: [worlds + 1], index of the first box of each world, followed by n; default: a single world.
+            geometry: [worlds], handle of each world's geometry, as in Renderer.upload(); default: 0.
+            light_states: States of the lights of all worlds: 0 off, 1 red, 2 yellow, 3 green, 4 unknown.
+            light_begin: [worlds + 1], index of the first light of each world, followed by the number of lights.
+
+        Raises:
+            pictura.Error: An array has another shape. Inconsistent arrays raise the error later, in render().
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
     @property
     def boxes(self) -> Array:
         """
-        uint8 [boxes, 36], read-only: `numpy.asarray(boxes).view(BOX_DTYPE)[:, 0]` has their fields by name.
+        Boxes, read-only, uint8 [boxes, 36]. `numpy.asarray(boxes).view(BOX_DTYPE)[:, 0]` has the fields by name.
         """
     @property
     def num_worlds(self) -> int:
         """
-        Worlds.
+        Number of worlds.
         """
 class SceneFile:
     """
-    Scene of one TOML file: geometry, boxes, rig and views.
-    
+    Scene in a TOML file: geometry, boxes, rig and views.
+
     Examples:
         >>> text = '''size_px = [96, 54]
         ... [[view]]
@@ -550,7 +581,7 @@ class SceneFile:
     """
     def __init__(self, path: str) -> None:
         """
-        Raises pictura.Error naming file, line, table and key.
+        Reads a scene file. Raises pictura.Error, which names file, line, table and key.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -566,7 +597,7 @@ class SceneFile:
     @property
     def scene(self) -> Scene:
         """
-        Its world is on geometry 0.
+        Scene of one world, whose geometry has the handle 0.
         """
     @property
     def view_names(self) -> list[str]:
@@ -578,9 +609,9 @@ class SceneFile:
         """
 class Images:
     """
-    Images of views by each camera of a rig, in the renderer's memory, and their planes if requested. A renderer can draw into them
-    repeatedly.
-    
+    Images of several views by all cameras of a rig, in the renderer's memory. They may have planes: depth, class and
+    instance of each pixel. A renderer can draw into the same images repeatedly.
+
     Examples:
         >>> renderer = pictura.Renderer('cpu', pictura.Rig.paper(32, 18))
         >>> images = renderer.make_images(num_views=5)
@@ -591,37 +622,37 @@ class Images:
         ...
     def camera(self, index: typing.SupportsInt | typing.SupportsIndex) -> Array:
         """
-        [views, 3, height, width] of one camera.
+        Returns the images of one camera, [views, 3, height, width].
         """
     def planes(self, camera: typing.SupportsInt | typing.SupportsIndex) -> dict:
         """
-        Returns planes of the front surface at each pixel's centre, [views, height, width]: depth_m float32 (infinite without a
-        surface), class_id uint8 (0: none), instance_id uint16 (1 + the agent's index in its world, 0: no agent). Raises pictura.Error
-        for images without planes.
+        Returns planes [views, height, width], which describe the visible surface at each pixel's centre: depth_m float32
+        (infinite if there is no surface), class_id uint8 (0: none), instance_id uint16 (1 + the agent's index in its world; 0:
+        no agent). Raises pictura.Error for images without planes.
         """
     @property
     def blocks(self) -> list:
         """
-        Arrays [views, cameras of one size, 3, height, width], one for each distinct size.
+        Arrays [views, cameras, 3, height, width], one for the cameras of each image size.
         """
     @property
     def num_views(self) -> int:
         """
-        Capacity in views.
+        Number of views for which memory is allocated.
         """
     @property
     def rgb(self) -> Array:
         """
-        [views, cameras, 3, height, width], for a rig whose cameras have one size.
+        [views, cameras, 3, height, width], for a rig whose cameras have the same image size.
         """
 class _RendererInside:
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
 class Renderer:
     """
-    Draws scenes: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'. One thread at a time; several renderers are
-    independent. On CUDA its work is enqueued on `stream`.
-    
+    Renderer of scenes. Only one thread at a time may use a renderer; different renderers are independent. On CUDA, work is
+    enqueued on `stream`.
+
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
         >>> renderer = pictura.Renderer('cpu', pictura.Rig.paper(32, 18))
@@ -636,11 +667,23 @@ class Renderer:
         ...
     def __init__(self, name: str = 'auto', rig: Rig | None = None, *, device: str = 'cpu', num_threads: typing.SupportsInt | typing.SupportsIndex = 0, line_floor_px: typing.SupportsFloat | typing.SupportsIndex = 0.3499999940395355, debug_palette: bool = False, samples: str = '1', camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, stream: typing.Any = None) -> None:
         """
-        rig: default: the paper's. device: memory of scenes, views and images, 'cpu' or 'cuda:0'. num_threads: 0 for all. line_floor_px:
-        minimum width of a line on screen. debug_palette: tints halted and parked agents. samples: for 'gl', '4' (MSAA) or '4x4'
-        (supersampling). camera_severity: severity of randomized cameras, 0 to 2, as in evaluations (docs/explanation/cameras.md); draws
-        are keyed by the field `key` of views, which a simulator fills. stream: a cudaStream_t as int; None: the legacy default stream.
-        Raises pictura.UsageError listing the names, pictura.Error if the backend cannot run here.
+        Creates a renderer.
+
+        Args:
+            name: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'.
+            rig: Cameras; default: the paper's rig.
+            device: Memory of scenes, views and images: 'cpu' or 'cuda:0'.
+            num_threads: Number of CPU threads; 0: all.
+            line_floor_px: Minimum width of a line in images, in pixels.
+            debug_palette: Whether halted and parked agents have other colours.
+            samples: For 'gl': '4' (MSAA) or '4x4' (supersampling).
+            camera_severity: Severity of randomized cameras, 0 to 2, as in evaluations (docs/explanation/cameras.md). The field
+                `key` of a view, which a simulator sets, keys the random numbers.
+            stream: A cudaStream_t as int; None: the legacy default stream.
+
+        Raises:
+            pictura.UsageError: The name is unknown; the message lists the valid names.
+            pictura.Error: The renderer cannot run on this machine.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -648,29 +691,34 @@ class Renderer:
         ...
     def check(self) -> None:
         """
-        Waits for the work on the stream; raises pictura.Error for faults found by a device.
+        Waits for the work on the stream. Raises pictura.Error for errors that CUDA kernels have found.
         """
     def make_images(self, num_views: typing.SupportsInt | typing.SupportsIndex, *, dtype: str = 'uint8', planes: bool = False) -> Images:
         """
-        Allocates images of num_views views: 'uint8' of 0 to 255, or 'float32' or 'float16' (not on all renderers) of 0 to 1.
+        Allocates images for num_views views. dtype: 'uint8' has values from 0 to 255; 'float32' and 'float16', which some renderers lack, have values from 0 to 1. planes: whether depth, class and instance are drawn too.
         """
     def render(self, scene: Scene, views: typing.Any, out: typing.Any = None, *, dtype: str = 'uint8', planes: bool = False) -> typing.Any:
         """
-        Draws every camera for every view. Returns `out`.
-        
-        views: VIEW_DTYPE [n], or a simulator's. out: Images, or for a rig of one size an array [n, cameras, 3, height, width] of uint8,
-        float32, float16 or bfloat16 (0 to 255) in the renderer's memory (NumPy, torch, ...); default: new Images of `dtype` and
-        `planes`. On CUDA the call returns when the work is enqueued; on the CPU ^C ends it between views. Raises pictura.Error naming
-        the array that does not fit.
+        Draws the images of every camera for every view. Returns `out`.
+
+        views: VIEW_DTYPE [n], or Simulator.views.
+        out: Images, or an array [n, cameras, 3, height, width] in the renderer's memory (NumPy, torch, ...) if all cameras have
+        the same image size. Its type is uint8, float32, float16 or bfloat16, with values from 0 to 255. Default: new Images
+        with `dtype` and `planes`.
+        On CUDA the call returns when the work is enqueued. On the CPU, ^C ends the call between two views. Raises
+        pictura.Error, which names an invalid array.
         """
     def upload(self, handle: typing.SupportsInt | typing.SupportsIndex, geometry: Geometry) -> None:
         """
-        Copies a geometry under `handle`, 0 to 65535, which scenes refer to. Raises pictura.Error if the geometry is invalid.
+        Copies a geometry to the renderer. Scenes refer to it by `handle`, 0 to 65535. Raises pictura.Error if the geometry is invalid.
         """
     def visibility(self, scene: Scene, views: typing.Any, queries: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.float32]:
         """
-        Returns the visibility of agents: for each query of (view, box of the scene), int [n, 2], the coverage in the view's images over
-        the coverage when drawn alone, float32 [n]; NaN outside all cameras' frames.
+        Returns the visibility of agents, float32 [n].
+
+        queries: int [n, 2], pairs of (index of the view, index of the box in the scene).
+        A visibility is the area that the box covers in the view's images, divided by the area that it covers if it is drawn
+        alone. It is NaN if the box is outside the images of all cameras.
         """
     @property
     def choice(self) -> str:
@@ -689,7 +737,7 @@ class Renderer:
     @property
     def stream(self) -> int:
         """
-        cudaStream_t of the work, as int; 0: the legacy default stream.
+        The cudaStream_t on which work is enqueued, as int; 0: the legacy default stream.
         """
     @stream.setter
     def stream(self, arg1: typing.Any) -> None:
@@ -697,7 +745,7 @@ class Renderer:
 class StepResult:
     """
     Results of a step, one element per slot, in the simulator's memory; every step overwrites the same arrays.
-    
+
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
         >>> result = simulator.step(np.full(4, pictura.IDLE_ACTION, np.int32))
@@ -739,12 +787,12 @@ class StepResult:
     @property
     def valid(self) -> typing.Any:
         """
-        bool [slots]: the agent was active when the step began: learn from it.
+        bool [slots]: the agent was active when the step began, so training may use the transition.
         """
 class Snapshot:
     """
-    State that a simulator keeps in its own memory.
-    
+    Copy of a simulator's state in the simulator's memory, from Simulator.snapshot().
+
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
         >>> before, snapshot = simulator.state_hash(), simulator.snapshot()
@@ -763,9 +811,12 @@ class _ControllerInside:
         ...
 class Controller:
     """
-    Driver in one simulator on the CPU: 'lane' (the lane keeper), 'idm_lanes' (along lanes, behind others), 'idle' or 'random', in
-    worlds of recorded scenes 'log', 'inverse' or 'idm', a policy of a pictura.PolicySession, or several of these.
-    
+    Controller of the agents in one simulator on the CPU.
+
+    Controllers by name are 'lane' (follows lanes), 'idm_lanes' (follows lanes and keeps a distance to vehicles ahead),
+    'idle' and 'random', and in recorded scenes 'log', 'inverse' and 'idm'. pictura.PolicySession makes controllers with a
+    policy; shared() combines several controllers.
+
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
         >>> simulator.run(pictura.Controller('lane', simulator), steps=50)
@@ -779,34 +830,36 @@ class Controller:
     @staticmethod
     def shared(drivers: collections.abc.Sequence[tuple[Controller, typing.Any]], simulator: Simulator) -> Controller:
         """
-        Returns a controller of several drivers that share a simulator's slots, of (controller, mask): if two command a slot, the later
-        one drives.
-        
-        mask: uint8 or bool [slots] in the simulator's memory, which is read at every step; None: all slots. Raises pictura.Error for
-        another array and for a controller of another simulator.
+        Returns a controller that combines several controllers, each for some of a simulator's slots.
+
+        drivers: pairs (controller, mask). If two controllers command the same slot, the later one in the list drives.
+        mask: uint8 or bool [slots] in the simulator's memory, which every step reads; None: all slots.
+        Raises pictura.Error for a mask of another shape, type or device, and for a controller of another simulator.
         """
     def __init__(self, name: str, simulator: Simulator, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
-        Raises pictura.UsageError listing the names.
+        Raises pictura.UsageError, which lists the valid names, if `name` is unknown.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
     def act(self, simulator: Simulator) -> typing.Any:
         """
-        Returns commands for all slots, which may be changed before step_commands() executes them: NumPy's COMMAND_DTYPE [slots], or
-        uint8 [slots, 28] on CUDA. Every call returns the same memory.
+        Returns commands for all slots: a NumPy array of COMMAND_DTYPE [slots], or uint8 [slots, 28] on CUDA. The caller may
+        change them before step_commands() executes them. Every call returns the same memory.
         """
     @property
     def name(self) -> str:
         ...
 class Simulator:
     """
-    Many worlds, each on one map, stepped together. Arrays have one element per slot: the controlled agents of world 0, then those
-    of world 1, and so on. Executors 'cpu' and 'cuda' give the same bits.
-    
-    One thread at a time; several simulators are independent. The GIL is released while C++ works. On CUDA its work is enqueued on
-    `stream`, calls return before it is done, and invalid values raise an error in check() or a later call.
-    
+    Many worlds, each on one map, which advance together. Arrays have one element for each slot: first for the controlled
+    agents of world 0, then for the controlled agents of world 1, and so on. Results of the executors 'cpu' and 'cuda' are
+    equal bit for bit.
+
+    Only one thread at a time may use a simulator; different simulators are independent. The GIL is released while C++ code
+    runs. On CUDA, work is enqueued on `stream`, and calls return before the work is done. Invalid values then raise an
+    error in check() or a later call.
+
     Examples:
         >>> town = pictura.Map.load('procedural:3')
         >>> simulator = pictura.Simulator([town], [(0, 16)] * 4, seed=1)          # four worlds of sixteen agents
@@ -816,40 +869,46 @@ class Simulator:
     """
     def __init__(self, maps: collections.abc.Sequence[Map], worlds: collections.abc.Sequence, *, executor: str = 'auto', device: str = 'cpu', seed: typing.SupportsInt | typing.SupportsIndex = 0, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, dt_s: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, episode_steps: typing.SupportsInt | typing.SupportsIndex = 1280, reset_inactive_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.4000000059604645, pedestrian_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, cyclist_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, parked_cars: typing.SupportsInt | typing.SupportsIndex = 32, light_cycles: str = 'phases', walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0, light_heads: str = 'as_mapped', wall_observations: bool = False, reset_at_standstill: bool = False, blind: typing.SupportsFloat | typing.SupportsIndex = 0.0, phantom_braking: typing.SupportsFloat | typing.SupportsIndex = 0.0, inattentive: typing.SupportsFloat | typing.SupportsIndex = 0.0, stagger_episodes: bool = False, fixed_lights: bool = False, auxiliary_observations: bool = True, vector_observations: bool = True, conditioning: dict = {}, stream: typing.Any = None) -> None:
         """
-        Simulators of worlds on maps, at the start of their first episodes. Defaults are the paper's training world.
-        
+        Creates a simulator whose worlds are at the start of their first episodes. Defaults are those of the paper's training
+        world.
+
         Args:
             maps: Maps of the worlds.
-            worlds: One (index of the map, agents) or (map, agents, global world) a world; the global world keys its random numbers.
+                worlds: A tuple (index of the map, number of agents) or (index, number, global world) for each world. The global
+                    world, an int, keys the world's random numbers.
             executor: 'cpu', 'cuda' or 'auto'.
             device: Memory of observations and scenes: 'cpu', 'cuda' or 'cuda:INDEX'.
             seed: Seed of all random numbers.
-            num_threads: Threads of the host; 0: all.
+            num_threads: Number of CPU threads; 0: all.
             dt_s: Length of a step in seconds.
             episode_steps: Steps after which a world's episode ends.
-            reset_inactive_fraction: A world's episode ends when this share of its agents is inactive; more than 1: never.
+            reset_inactive_fraction: A world's episode ends when this share of its agents is inactive; a value over 1 disables
+            this.
             pedestrian_fraction: Share of pedestrians among the agents.
             cyclist_fraction: Share of cyclists among the agents.
-            parked_cars: Parked cars of each world and episode.
-            light_cycles: 'phases', lights of a junction take turns, or 'independent', each light cycles alone.
+            parked_cars: Number of parked cars in each world.
+            light_cycles: 'phases': lights of a junction take turns. 'independent': each light has its own cycle.
             walls: Whether buildings stand along the roads.
-            wall_seed: Draws the heights of walls.
-            light_heads: 'as_mapped', or 'visible': heads beside or before their stop line stand 10 m beyond it, 3.5 m high.
-            wall_observations: Whether the set `walls` is observed.
-            reset_at_standstill: Accelerations end where the speed changes its sign.
-            blind: Share of agents that see no other road user for some seconds. Impaired agents are drawn per episode and never valid.
-            phantom_braking: Share of agents that brake hard for some seconds.
-            inattentive: Share of agents that see no traffic light.
-            stagger_episodes: The first episode of each world ends after a drawn number of steps.
-            fixed_lights: Lights are green, yellow and red for 10, 3 and 2 s, as in evaluations; else times are drawn per episode.
-            auxiliary_observations: Whether auxiliary slots of observations are filled.
-            vector_observations: Whether the entity sets are observed.
-            conditioning: A number or (low, high) by name of CONDITIONING_NAMES; the paper's ranges otherwise.
+            wall_seed: Random seed of the heights of walls.
+            light_heads: Positions of light heads. 'as_mapped': as in the map. 'visible': heads beside or before their stop line
+            are moved 10 m beyond it, 3.5 m high.
+                wall_observations: Whether the entity set `walls` is observed.
+                reset_at_standstill: Whether accelerations become 0 when the speed changes its sign.
+                blind: Share of agents that see no other road users for some seconds. These and the next two kinds of impaired
+                    agents are drawn at random in each episode; their transitions are never valid.
+                phantom_braking: Share of agents that brake hard for some seconds without a reason.
+                inattentive: Share of agents that see no traffic lights.
+                stagger_episodes: Whether the first episode of each world ends after a random number of steps.
+                fixed_lights: Whether lights are green, yellow and red for 10, 3 and 2 s, as in evaluations. Otherwise durations are
+                    random in each episode.
+                auxiliary_observations: Whether auxiliary numbers, which no image shows, are observed.
+                vector_observations: Whether the entity sets are observed.
+                conditioning: A number or a range (low, high) for names in CONDITIONING_NAMES; other names have the paper's ranges.
             stream: A cudaStream_t as int; None: the legacy default stream.
-        
+
         Raises:
-            pictura.UsageError: Names what cannot be simulated.
-            pictura.Error: There is no such device.
+            pictura.UsageError: An argument is invalid; the message names it.
+                pictura.Error: The device does not exist.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -857,95 +916,111 @@ class Simulator:
         ...
     def check(self) -> None:
         """
-        Waits for the work on the stream; raises pictura.Error for errors found by a device.
+        Waits for the work on the stream. Raises pictura.Error for errors that CUDA kernels have found.
         """
     def draw(self, world: typing.SupportsInt | typing.SupportsIndex = 0, agent: typing.SupportsInt | typing.SupportsIndex = -1, *, width_px: typing.SupportsInt | typing.SupportsIndex = 640, height_px: typing.SupportsInt | typing.SupportsIndex = 480, width_m: typing.SupportsFloat | typing.SupportsIndex = 150.0) -> numpy.typing.NDArray[numpy.uint8]:
         """
-        Draws a world from above, uint8 [height, width, 3], on the CPU. agent: agent of that world in the middle, shown with its
-        waypoints; -1 shows the whole map. width_m: width of the shown surroundings.
+        Draws a world from above on the CPU. Returns uint8 [height, width, 3]. agent: agent of this world in the middle, with
+        its waypoints; -1: the whole map. width_m: width of the drawn area in metres, if there is an agent.
         """
     def observe(self, queries: typing.Any, hidden: typing.Any = None, inserted: typing.Any = None, *, out: typing.Any = None) -> typing.Any:
         """
-        Returns the observations of slots if boxes of their worlds were absent, and other boxes present. Only partners differ; the state
-        is unchanged. pictura.make_queries() creates the arguments:
-        queries: QUERY_DTYPE [n], or uint8 [n, 24]: a slot, its ranges [begin, end) of the lists `hidden` and `inserted`, and
-        leaves_gaps. 0: hidden partners are replaced by boxes that were too far away; 1: rows of zeros replace them.
-        hidden: int32 [m], indices into the scene's boxes. inserted: INSERTED_DTYPE [k], or uint8 [k, 40]: a box of BOX_DTYPE and its
-        speed_mps. out: arrays of the caller by the names of `observations`, with n in place of the slots; default: new arrays. All
-        arrays are in the simulator's memory. Returns out, arrays by name. Raises pictura.Error naming an invalid array or query, and
-        then writes nothing; on CUDA queries are checked as in step().
+        Returns hypothetical observations, in which some boxes of the world are hidden and other boxes are inserted. Only the
+        entity set `partners` differs from the actual observation. The state is unchanged. pictura.make_queries() creates the
+        first three arguments. All arrays must be in the simulator's memory.
+
+        queries: QUERY_DTYPE [n], or uint8 [n, 24]: for each query the observing slot, its ranges [begin, end) in `hidden` and
+        `inserted`, and leaves_gaps. If leaves_gaps is 0, boxes further away replace hidden partners; if it is 1, rows of zeros
+        replace them.
+        hidden: int32 [m], indices into the scene's boxes.
+        inserted: INSERTED_DTYPE [k], or uint8 [k, 40]: a box of BOX_DTYPE and its speed_mps.
+        out: arrays [n, ...] for the results, with the names of `observations`; default: new arrays.
+        Returns out. Raises pictura.Error, which names an invalid array or query; then nothing is written. On CUDA, invalid
+        queries raise the error in check() or a later call.
         """
     def reset(self, world_mask: typing.Any = None, seed: typing.SupportsInt | typing.SupportsIndex | None = None) -> None:
         """
-        Starts new episodes. world_mask: uint8 or bool [worlds] in the simulator's memory, the worlds to reset; default: all. seed:
-        their seed from now on; default: the simulator's own. Raises pictura.Error for another array.
+        Starts new episodes.
+
+        world_mask: uint8 or bool [worlds] in the simulator's memory, true for worlds to reset; default: all worlds.
+        seed: seed of these worlds from now on; default: the simulator's seed.
+        Raises pictura.Error for a mask of another shape, type or device.
         """
     @typing.overload
     def restore(self, saved: bytes) -> None:
         """
-        Restores a saved state. Raises pictura.Error naming the difference.
+        Restores a state of save(). Raises pictura.Error if the state is of other worlds; the message names the difference.
         """
     @typing.overload
     def restore(self, snapshot: Snapshot) -> None:
         """
-        Restores a snapshot of these worlds; on CUDA without waiting.
+        Restores a snapshot of these worlds. On CUDA it does not wait for the stream.
         """
     def run(self, controller: Controller, steps: typing.SupportsInt | typing.SupportsIndex) -> None:
         """
-        Takes steps with a controller for all agents. ^C ends the call between steps.
+        Advances every world by `steps` steps, with a controller for all agents. ^C ends the call between two steps.
         """
     def save(self) -> bytes:
         """
-        Returns the complete state as bytes, for exact resume on any executor. Waits for the stream.
+        Returns the complete state as bytes, from which any executor can resume exactly. Waits for the stream.
         """
     def set_state(self, slots: typing.Any, fields: dict) -> None:
         """
-        Sets fields of agents. slots: int32 [n], each once. fields: arrays [n] or [n, per agent] by the names of AGENT_FIELDS, of their
-        types, all in the simulator's memory. Lane, height, box, view and observation are updated. Raises pictura.Error naming an
-        invalid value; on CUDA values are checked as in step().
+        Sets fields of agents, and updates their lanes, heights, boxes, views and observations.
+
+        slots: int32 [n], without duplicates. fields: arrays [n] or [n, numbers per agent], with names and types of
+        AGENT_FIELDS. All arrays must be in the simulator's memory. Raises pictura.Error, which names an invalid value. On CUDA,
+        invalid values raise the error in check() or a later call.
         """
     def set_worlds(self, maps: collections.abc.Sequence[Map], worlds: collections.abc.Sequence, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
         """
-        Replaces the worlds by other worlds on other maps, at the start of their first episodes, as in a new simulator. Get the arrays
-        again afterwards: previous arrays remain valid memory, which later calls may write. Raises as the constructor does.
+        Replaces all worlds by other worlds on other maps, at the start of their first episodes. Afterwards get the simulator's
+        arrays again: arrays from before this call remain valid memory, but later calls may overwrite them. Raises the same
+        errors as the constructor.
         """
     def snapshot(self) -> Snapshot:
         """
-        Returns a copy of the state in the simulator's memory.
+        Returns a copy of the state. The copy is in the simulator's memory.
         """
     def spawn_report(self) -> dict:
         """
-        Returns counts by name of requested, spawned, refused, entered and left agents, and of parked cars. Waits for the stream.
+        Returns the numbers of requested, spawned, refused, entered and left agents and of parked cars, by name. Waits for the stream.
         """
     def state_hash(self) -> int:
         """
-        Returns 64 bits over the complete state, equal on every executor. Waits for the stream.
+        Returns a 64-bit hash of the complete state, which is equal on all executors. Waits for the stream.
         """
     def step(self, actions: typing.Any) -> typing.Any:
         """
-        Advances every world by one step. actions: int32 [slots] in the simulator's memory, each in [0, 12): 3 times the index of the
-        longitudinal jerk (-15, -4, 0, 4 m/s3) plus the index of the lateral jerk (-4, 0, 4 m/s3, left positive). Actions of inactive
-        agents are ignored. A world whose last step ended its episode starts the next one instead, and its slots are not valid. Returns
-        the StepResult. Raises pictura.Error, which leaves the state unchanged, for another array and for actions out of range.
+        Advances every world by one step. Returns the StepResult.
+
+        actions: int32 [slots] in the simulator's memory, in [0, 12). An action is 3 times the index of the longitudinal jerk
+        (-15, -4, 0, 4 m/s3) plus the index of the lateral jerk (-4, 0, 4 m/s3, left is positive). Actions of inactive agents
+        are ignored.
+        If the previous step ended a world's episode, this step starts the world's next episode instead, and its slots are not
+        valid.
+        Raises pictura.Error for an array of another shape, type or device, and for actions out of range; the state is then
+        unchanged.
         """
     def step_commands(self, commands: typing.Any) -> typing.Any:
         """
-        Advances every world by one step with commands, COMMAND_DTYPE [slots]: kind 0 an action, 1 a kinematic state, 2 absence from the
-        episode, 3 as recorded, in worlds of a pictura.Scenario. Returns and raises as step() does.
+        Advances every world by one step with commands, COMMAND_DTYPE [slots]. The kinds of commands are 0: an action; 1: a
+        kinematic state; 2: absence for the rest of the episode; 3: the recorded state, in worlds of a pictura.Scenario. Returns
+        and raises the same as step().
         """
     def time_steps(self, actions: typing.Any, steps: typing.SupportsInt | typing.SupportsIndex) -> float:
         """
-        Returns the seconds of this number of steps with the same actions, called from C++, for measurements of Python's overhead in
+        Executes steps with the same actions from C++. Returns the duration in seconds, for measurements of Python's overhead in
         step().
         """
     def totals(self) -> dict:
         """
-        Returns counts and sums since construction by name; reward_terms is a dict. Waits for the stream.
+        Returns counts and sums since construction, by name. `reward_terms` is a dict. Waits for the stream.
         """
     @property
     def agent_of_slot(self) -> Array:
         """
-        int32 [slots]: the agent's index in its world.
+        int32 [slots]: index of the slot's agent in its world.
         """
     @property
     def choice(self) -> str:
@@ -961,17 +1036,17 @@ class Simulator:
     @property
     def episode_index(self) -> Array:
         """
-        int32 [worlds]: the number of the episode.
+        int32 [worlds]: index of the current episode.
         """
     @property
     def episode_over(self) -> Array:
         """
-        bool [worlds]: the episode has ended, and the next step begins the next one.
+        bool [worlds]: whether the episode has ended; the next step then begins the next episode.
         """
     @property
     def episode_step(self) -> Array:
         """
-        int32 [worlds]: completed steps in the present episode.
+        int32 [worlds]: number of completed steps in the current episode.
         """
     @property
     def episode_steps(self) -> int:
@@ -979,7 +1054,7 @@ class Simulator:
     @property
     def geometries(self) -> dict:
         """
-        Geometries of its maps, by their handles in the scene.
+        Geometries of the maps, by their handles in the scene.
         """
     @property
     def maps(self) -> list[Map]:
@@ -996,7 +1071,7 @@ class Simulator:
     @property
     def observations(self) -> dict:
         """
-        Arrays [slots, ...] by name, of the state after the last call: ego, partners, lanes, boundaries, controls, walls, set_counts, conditioning, waypoints.
+        Observations of the current state, arrays [slots, ...] by name: ego, partners, lanes, boundaries, controls, walls, set_counts, conditioning, waypoints.
         """
     @property
     def scene(self) -> Scene:
@@ -1009,12 +1084,12 @@ class Simulator:
     @property
     def state(self) -> dict:
         """
-        Every field of the agents by name, read-only, [slots] or [slots, per agent].
+        Fields of the agents by name, read-only arrays [slots] or [slots, numbers per agent].
         """
     @property
     def stream(self) -> int:
         """
-        cudaStream_t of the work, as int; 0: the legacy default stream.
+        The cudaStream_t on which work is enqueued, as int; 0: the legacy default stream.
         """
     @stream.setter
     def stream(self, arg1: typing.Any) -> None:
@@ -1022,23 +1097,23 @@ class Simulator:
     @property
     def views(self) -> Array:
         """
-        One view per slot: uint8 [slots, 60] for render(); its fields are those of VIEW_DTYPE.
+        View of each slot for render(): uint8 [slots, 60] with the fields of VIEW_DTYPE.
         """
     @property
     def world_of_slot(self) -> Array:
         """
-        int32 [slots].
+        int32 [slots]: index of the slot's world.
         """
     @property
     def worlds(self) -> list[tuple[int, int, int]]:
         """
-        (map, agents, global world) of each.
+        (index of the map, number of agents, global world) of each world.
         """
 class Recorder:
     """
-    Records a world of a simulator on the CPU from now on: every step of the simulator, by any function, as long as the recorder
-    lives.
-    
+    Records one world as a replay. The simulator must be on the CPU. While the recorder exists, it records every step of the
+    simulator, by any function.
+
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
         >>> recorder = pictura.Recorder(simulator, follow=0)
@@ -1049,20 +1124,22 @@ class Recorder:
     """
     def __init__(self, simulator: typing.Any, *, world: typing.SupportsInt | typing.SupportsIndex = 0, follow: typing.SupportsInt | typing.SupportsIndex = -1, rig: Rig | None = None) -> None:
         """
-        follow: agent of that world with which the page opens, and whose decisions are recorded; -1: none. rig: records that agent's
-        images at every step, drawn by the CPU renderer, without loss; by default the page draws the paper's cameras itself. Raises
-        pictura.UsageError if the world or agent does not exist or the simulator is on a device.
+        follow: agent that the page shows first, and whose decisions are recorded; -1: none.
+        rig: cameras whose images of this agent are recorded at every step, losslessly, with the CPU renderer. By default no
+        images are recorded, and the page draws images of the paper's cameras.
+        Raises pictura.UsageError if the world or agent does not exist or the simulator is on CUDA.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
     def decide(self, logits: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], value: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
-        Records a policy's response to the followed agent's state, for the next step: logits [12], and its value.
+        Records a policy's logits [12] and value for the followed agent, which belong to the next step.
         """
     def write(self, path: str, policy: str = '') -> None:
         """
-        Ends the recording and writes it, completely or not at all: *.html, a page for any browser, or *.mcap, for Foxglove. May be
-        called repeatedly. policy: its name in the page. Raises pictura.Error naming the file.
+        Ends the recording and writes it to a file, completely or not at all: *.html, a page for any browser, or *.mcap, for
+        Foxglove. May be called repeatedly. policy: name of the policy, which the page shows. Raises pictura.Error if the file
+        cannot be written.
         """
     @property
     def metrics(self) -> dict:
@@ -1072,13 +1149,14 @@ class Recorder:
     @property
     def num_steps(self) -> int:
         """
-        Number of steps and resets so far.
+        Number of recorded steps and resets.
         """
 class LiveView:
     """
-    Page in the browser that shows the only world of a simulator on the CPU while it runs: pause, step, pace, and drive an agent
-    with the keyboard. The simulator's steps then wait until they are due: in real time, or at the page's pace.
-    
+    Live page in the browser, which shows the only world of a simulator while it runs. The simulator must be on the CPU. The
+    page can pause the simulator, take single steps, change the speed, and drive an agent with the keyboard. Steps of the
+    simulator wait, so that they run in real time or at the speed that the page sets.
+
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
         >>> view = pictura.LiveView(simulator, wait_for_page=False)
@@ -1089,25 +1167,27 @@ class LiveView:
     """
     def __init__(self, simulator: typing.Any, *, port: typing.SupportsInt | typing.SupportsIndex = 0, host_name: str = '', follow: typing.SupportsInt | typing.SupportsIndex = 0, rig: Rig | None = None, wait_for_page: bool = True) -> None:
         """
-        port: of the loopback, 0 for a free one. host_name: if given, listens on all addresses, for pages that address this machine by
-        this name. follow: agent with which pages open. rig: cameras of its images; by default pages draw the paper's cameras
-        themselves. wait_for_page: waits for the first page before the first step. Raises pictura.UsageError if this package lacks the
-        server, pictura.Error if the port is in use.
+        port: port on the loopback interface; 0: a free port.
+        host_name: if given, the server listens on all interfaces, and browsers reach this machine by this name.
+        follow: agent that pages show first.
+        rig: cameras of this agent's images; by default pages draw images of the paper's cameras.
+        wait_for_page: whether the first step waits for the first page.
+        Raises pictura.UsageError if this package has no server, and pictura.Error if the port is in use.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
     def close(self) -> None:
         """
-        Tells pages that the simulation has ended, and lets the simulator run freely.
+        Notifies pages that the simulation has ended. The simulator's steps no longer wait.
         """
     def decide(self, agent: typing.SupportsInt | typing.SupportsIndex, logits: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], value: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
-        Shows a policy's response to an agent's state while pages follow that agent, until the next call.
+        Sets a policy's logits [12] and value for an agent. Pages that follow this agent show them until the next call.
         """
     @property
     def address(self) -> str:
         """
-        Address of the page, including its secret.
+        URL of the page, including a secret token.
         """
     @property
     def num_pages(self) -> int:
@@ -1116,7 +1196,7 @@ class LiveView:
         """
 def _expand_map_names(names: collections.abc.Sequence[str]) -> list[str]:
     """
-    Returns the names of maps with every range of generated towns, such as 'procedural:1000-1011', in full.
+    Returns the names of maps, in which each range of generated towns, such as 'procedural:1000-1011', is expanded.
     """
 def _hash64(data: bytes) -> int:
     """
@@ -1144,8 +1224,9 @@ def _score_rollouts(path: str, scenes: collections.abc.Sequence[str], version: s
     """
 def draw_worlds(seed: typing.SupportsInt | typing.SupportsIndex, num_slots: typing.SupportsInt | typing.SupportsIndex, min_agents: typing.SupportsInt | typing.SupportsIndex, max_agents: typing.SupportsInt | typing.SupportsIndex, num_maps: typing.SupportsInt | typing.SupportsIndex) -> list[tuple[int, int, int]]:
     """
-    Draws worlds of sizes from U{min, max} until they fill the slots; they use the maps in turn.
-    
+    Draws random worlds until they fill the slots. The number of agents of a world is uniform in [min_agents, max_agents].
+    Worlds use the maps in turn. Returns (index of the map, number of agents, global world) of each world.
+
     Examples:
         >>> worlds = pictura.draw_worlds(seed=1, num_slots=100, min_agents=5, max_agents=40, num_maps=2)
         >>> sum(agents for _, agents, _ in worlds)
@@ -1154,27 +1235,34 @@ def draw_worlds(seed: typing.SupportsInt | typing.SupportsIndex, num_slots: typi
 def known_towns() -> list[str]:
     """
     Returns the names of the towns in the map folder, sorted.
-    
+
     Examples:
         >>> pictura.known_towns()      # doctest: +SKIP
         ['Town01', 'Town02', 'Town03']
     """
 def make_views(origin_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], heading_rad: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], *, world: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, ego_agent: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, body_length_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32] | None = None) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
     """
-    Returns poses of a rig, a NumPy array of VIEW_DTYPE [n].
-    
-    origin_m [n, 3]: origin of the rig, on the ground. heading_rad [n]. world [n]: default: 0. ego_agent [n]: box of the scene that
-    is left out, -1 for none. body_length_m [n]: bodies shorter than 4.5 m move cameras nearer to their origin. Raises
-    pictura.Error for other shapes.
-    
+    Returns views (poses of a rig) as a NumPy array of VIEW_DTYPE [n].
+
+    Args:
+        origin_m: [n, 3], origins of the rig on the ground, in metres.
+        heading_rad: [n], headings in radians.
+        world: [n], indices of worlds; default: 0.
+        ego_agent: [n], index of the box in the scene that is not drawn in the view; -1: none.
+        body_length_m: [n], lengths of the bodies that carry the rig. Bodies shorter than 4.5 m move the cameras closer to
+            the origin.
+
+    Raises:
+        pictura.Error: An array has another shape.
+
     Examples:
         >>> pictura.make_views(origin_m=[[0, 0, 0], [5, 0, 0]], heading_rad=[0, 1.5]).shape
         (2,)
     """
 def map_folder() -> str:
     """
-    Returns the folder of towns: $PICTURA_DATA, or the user's data folder.
-    
+    Returns the folder in which load() looks for towns: $PICTURA_DATA, or the user's data folder.
+
     Examples:
         >>> isinstance(pictura.map_folder(), str)
         True
@@ -1182,7 +1270,7 @@ def map_folder() -> str:
 def renderer_names() -> list[str]:
     """
     Returns the renderers of this build.
-    
+
     Examples:
         >>> 'cpu' in pictura.renderer_names()
         True
@@ -1190,16 +1278,16 @@ def renderer_names() -> list[str]:
 def simulator_names() -> list[str]:
     """
     Returns the executors of this build.
-    
+
     Examples:
         >>> 'cpu' in pictura.simulator_names()
         True
     """
 def write_gallery(folder: str) -> int:
     """
-    Writes FOLDER/index.html over the replays in the folder, worst first, and returns their number. Raises pictura.Error naming a
-    page that is no replay.
-    
+    Writes FOLDER/index.html, an index of the replays in the folder, sorted from the worst. Returns the number of replays.
+    Raises pictura.Error, which names a page that is not a replay.
+
     Examples:
         >>> pictura.write_gallery('replays')            # doctest: +SKIP
         4
