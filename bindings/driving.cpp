@@ -413,23 +413,49 @@ void bind_evaluation(py::module_& module) {
         return dict_of(
             run_interruptible("evaluate", options.num_threads, {}, [&options] { return pictura::evaluate(options); }));
       },
-      R"(Runs the paper's evaluation, like `pictura evaluate`, in worlds that no training has.
+      R"(Runs the paper's evaluation, like `pictura evaluate`, in worlds that are not used for training.
 
-checkpoint: a policy's; '' with a controller in the paper's world. maps: names, files or ranges such as procedural:1-64.
-controller: 'lane', 'idm_lanes', 'random' or 'idle', which drives instead, or a function(observations) of NumPy arrays [slots,
-...] by name, like pictura.Simulator.observations, that returns actions int [slots], or logits [slots, 12] and values [slots], on
-the CPU. A function gets images, too, if cameras are named (rig, or width_px and height_px): `rgb` uint8 [slots, cameras, 3, height,
-width], black for inactive agents; rgb_0, rgb_1, ... if cameras have several sizes. densities: 'light', 'medium' and 'dense', with 60, 120 and 150 agents per world, or with agents_per_world. device, simulator, renderer: 'auto' or names;
-renderer '': as in training. rig, or width_px and height_px: other cameras. backbone: path of the program of policy.backbone.
-conditioning: numbers by name. light_cycles: 'phases' or 'independent', light_heads: 'as_mapped' or 'visible'; '': as in
-training. average: uses the average of weights in the checkpoint. camera_severity: severity of randomized cameras, 0 to 2
-(docs/explanation/cameras.md). decision_steps: steps for which an action is held; 0: as in training. others: other drivers, such
-as {'lane': 0.3, 'other.safetensors': 0.2}: policies or controllers, and their shares of vehicles; 'blind', 'phantom_braking'
-and 'inattentive': shares of agents that the policy drives while impaired. on_progress: called with the completed fraction and
-the remaining seconds, from a separate thread.
-Returns a dict: rows, one per density and driver (None: the evaluated driver), with its counts, and each metric as (value, half
-of its 95 % interval); seconds, agent_steps, policy_hash, light_cycles, others. ^C raises KeyboardInterrupt. Raises
-pictura.Error naming file and key of bad input.
+Returns a dict. `rows` has one dict for each density and driver (None: the evaluated driver), with counts, and metrics
+as (value, half width of the 95 % interval). The other names are seconds, agent_steps, policy_hash, light_cycles, others
+and camera_severity.
+
+Args:
+    checkpoint: File of a policy; '' with `controller`, which then drives in the paper's world.
+    maps: Names, files, or ranges such as procedural:1-64.
+    controller: Driver instead of the policy: 'lane', 'idm_lanes', 'random', 'idle', or a function. The function gets a
+        dict of NumPy arrays [slots, ...] like pictura.Simulator.observations, and returns actions int [slots], on the
+        CPU. If cameras are given (rig, or width_px and height_px), the dict also contains images: `rgb` uint8 [slots,
+        cameras, 3, height, width], black for inactive agents, or rgb_0, rgb_1, ... for cameras of several sizes.
+    densities: 'light', 'medium' and 'dense': 60, 120 and 150 agents per world.
+    agents_per_world: Number of agents per world instead of the densities' numbers; 0: as in `densities`.
+    others: Other drivers with their shares of vehicles, policy files or controllers, such as {'lane': 0.3,
+        'other.safetensors': 0.2}. 'blind', 'phantom_braking' and 'inattentive': shares of agents that the policy drives
+        while impaired.
+    first_scenario: Index of the first scenario.
+    scenarios: Number of scenarios per density. A scenario is one seeded world.
+    steps: Steps of 0.1 s per scenario.
+    argmax: Whether the policy takes its most likely action; otherwise actions are sampled.
+    seed: Seed of the scenarios.
+    num_threads: Number of CPU threads; 0: all.
+    device: Device of the policy, 'auto', 'cpu' or 'cuda'.
+    simulator: Executor of the simulator, or 'auto'.
+    renderer: Name of a renderer, or 'auto'; '': as in training.
+    samples: Samples per pixel of the renderer 'gl': '4' (MSAA) or '4x4' (supersampling).
+    rig: File of a rig instead of the cameras of the training.
+    width_px: Image width of the paper's rig; 0: as in training.
+    height_px: Image height of the paper's rig; 0: as in training.
+    backbone: Path of the program in policy.backbone, if it has moved since training.
+    conditioning: Numbers by name, which replace values of the configuration's [evaluate.conditioning].
+    average: Whether to use the average of weights in the checkpoint.
+    decision_steps: Steps for which each action is held; 0: as in training.
+    camera_severity: Severity of randomized cameras, 0 to 2 (docs/explanation/cameras.md).
+    light_cycles: 'phases' or 'independent'; '': as in training.
+    light_heads: 'as_mapped' or 'visible'; '': as in training.
+    on_progress: Function that is called with the completed fraction and the remaining seconds, from a separate thread.
+
+Raises:
+    KeyboardInterrupt: The user pressed ^C.
+    pictura.Error: An input is invalid; the message names file and key.
 
 Examples:
     >>> options = {'scenarios': 1, 'steps': 20, 'agents_per_world': 8}
@@ -443,15 +469,17 @@ Examples:
         return dict_of(run_interruptible("evaluate_robust", options.num_threads, {},
                                          [&options] { return pictura::evaluate_robust(options); }));
       },
-      R"(Runs the robust protocol, like `pictura evaluate --protocol robust`: a fixed set of generated towns, other drivers and
-randomized cameras (docs/how-to/robust_benchmark.md).
+      R"(Runs the robust protocol, like `pictura evaluate --protocol robust`: a fixed set of conditions with generated towns,
+other drivers and randomized cameras (docs/how-to/robust_benchmark.md).
 
-checkpoint: a policy's; '' with a controller: a name or a function, as for evaluate(). A function gets images if cameras are named
-(rig, or width_px and height_px). scenarios: scenarios per condition; other numbers than the default give a trial. All other
-arguments are those of evaluate(); seed, conditioning and camera_severity are fixed.
-Returns a dict: rows, one per condition, with part, name, not_driven (the reason if the condition does not apply, else None),
-counts, and each metric as (value, half of its 95 % interval); pooled: the same over the conditions of 'towns', 'others', 'cameras'
-and 'all'; seconds, agent_steps, policy_hash. ^C raises KeyboardInterrupt.
+checkpoint: file of a policy; '' with `controller`, a name or a function as for evaluate().
+scenarios: scenarios per condition. Another number than the default gives a trial, not a result of the benchmark.
+The other arguments are those of evaluate(). The benchmark fixes seed, conditioning and camera_severity.
+
+Returns a dict. `rows` has one dict for each condition: part, name, not_driven (the reason if the condition does not
+apply, else None), counts, and metrics as (value, half width of the 95 % interval). `pooled` has the metrics over all
+conditions of 'towns', 'others', 'cameras' and 'all'. The other names are seconds, agent_steps and policy_hash. ^C
+raises KeyboardInterrupt.
 
 Examples:
     >>> report = pictura.evaluate_robust('models/perspective.safetensors', scenarios=2)  # doctest: +SKIP
@@ -490,15 +518,24 @@ Examples:
       },
       R"(Runs the paper's zero-shot evaluation in recorded scenes, like `pictura evaluate --protocol`.
 
-checkpoint: a policy's; '' with a controller: 'log', 'inverse', 'idm', 'idm_lanes', 'random' or 'idle', which drives instead.
-scenes: files, folders, 'FILE#K'. protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents';
-control, start_step, steps, densities (shares of road users that remain) and rules (values by name,
-docs/explanation/evaluation.md) replace the protocol's settings. first_scene, num_scenes: range of the scenes; 0: all from the
-first on. rollouts: file of the rollouts, with the protocol 'simagents', in the format of the Waymo sim-agents challenge. realism:
-'2024' or '2025' scores these rollouts (docs/explanation/realism.md), with or without a file. The others as in evaluate().
-Returns a dict: rows, one per density, with each metric as (value, half of its 95 % interval); agents, one for every driven road
-user of a scene, density and rollout; realism, if asked for, as pictura.realism.score_file() returns it; scenes, scored,
-without_drivers, faults (skipped scenes, with reasons); seconds, agent_steps, policy_hash. ^C raises KeyboardInterrupt. Raises pictura.Error if no scene can be used.
+Returns a dict. `rows` has one dict for each density, with metrics as (value, half width of the 95 % interval). `agents`
+has one dict for each driven road user in each scene, density and rollout. `realism`, if requested, is the result of
+pictura.realism.score_file(). The other names are scenes, scored, without_drivers, faults (skipped scenes with reasons),
+seconds, agent_steps and policy_hash.
+
+checkpoint: file of a policy; '' with `controller`.
+scenes: files, folders, or 'FILE#K' for scene K of a file.
+protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents'.
+controller: driver instead of the policy: 'log', 'inverse', 'idm', 'idm_lanes', 'random' or 'idle'.
+control, start_step, steps, densities (shares of road users that remain), rules (values by name): settings that replace
+those of the protocol (docs/explanation/evaluation.md).
+first_scene, num_scenes: range of scenes; num_scenes 0: all from the first on.
+rollouts: file for the rollouts of the protocol 'simagents', in the format of the Waymo sim-agents challenge.
+realism: '2024' or '2025', the version of the realism score of these rollouts (docs/explanation/realism.md). It needs no
+rollouts file.
+The other arguments are those of evaluate().
+
+^C raises KeyboardInterrupt. Raises pictura.Error if no scene can be used.
 
 Examples:
     >>> results = pictura.evaluate_scenes('models/vector.safetensors', ['validation'])   # doctest: +SKIP
@@ -511,17 +548,25 @@ void bind_probes(py::module_& module) {
       &module, "probe_removal", &probe_removal, &write_removal_cases, &removal_summary_json, &RemovalOptions::removals,
       R"(Measures how policies' value and braking change when one road user is removed, like `pictura probe removal`.
 
-policies: checkpoints, safetensors, or functions as in evaluate(), on the CPU; the world is the first policy's, a function's is the
-paper's. A function that returns actions brakes with probability 0 or 1 and has no values (None); replay and 'untrained' need
-saved policies. maps, density, agents_per_world, steps and the arguments
-after argmax: as in evaluate(). scenes: number of driven scenarios, an equal share by each policy; 0: equally many on each map
-for each policy, two per map or more. removals: total number. sample_steps: steps between states. range_m: maximum distance of a
-user. control: 'none', 'nobody', 'permuted' or 'untrained'. batch: cases in a call. cases_file: a CSV file for every case.
-replay: a page *.html that plays the scene of one case and shows its images with and without the road user
-(docs/reference/replay.md); case: its number in cases_file, by default the case with the largest change in the first policy's
-value; cameras: keeps the ego's images of every step.
-Returns a dict, that of the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises
-pictura.Error naming file and key of bad input.
+A case is one removal of a road user (the user) for one observing agent (the ego) in one state. Returns a dict with the
+contents of the command's summary.json (docs/explanation/probes.md).
+
+policies: checkpoints or safetensors. The world is that of the first policy's training.
+scenes: number of driven scenarios, which are divided equally among the policies. 0: the same number for each map and
+policy, at least two per map.
+sample_steps: steps between sampled states.
+batch: number of cases that are computed together.
+removals: total number of cases.
+range_m: maximum distance of a user in metres.
+control: control experiment: 'none', 'nobody', 'permuted' or 'untrained' (docs/explanation/probes.md).
+cases_file: CSV file to write, with one row for each case.
+replay: page *.html to write, which plays the scene of one case and shows its images with and without the user
+(docs/reference/replay.md).
+case: number of the replayed case in cases_file; default: the case with the largest change in the first policy's value.
+cameras: whether the replay contains the ego's images of every step.
+The other arguments are those of evaluate().
+
+^C raises KeyboardInterrupt. Raises pictura.Error, which names file and key of an invalid input.
 
 Examples:
     >>> policies, maps = ['models/perspective.safetensors'], ['procedural:1']
@@ -531,12 +576,18 @@ Examples:
       R"(Measures how policies' value and braking change as a pedestrian emerges from behind a vehicle and is hidden again, like `pictura
 probe pedestrian`.
 
-policies, maps, density, agents_per_world, scenes, steps, sample_steps, batch and the arguments after argmax: as in
-probe_removal(). paths: total number, each through one state. hider_range_m: maximum distance of the vehicle behind which a path
-begins. min_speed_mps: minimum speed of the ego, forwards. height_m: height of the pedestrian. control: 'none', 'nobody' or
-'untrained'. cases_file: a CSV file for every point of every path. replay, case, cameras: as in probe_removal().
-Returns a dict, that of the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises
-pictura.Error naming file and key of bad input.
+The pedestrian is placed at points along a path in one fixed state. The path begins behind a vehicle, which hides the
+pedestrian from the ego. Returns a dict with the contents of the command's summary.json (docs/explanation/probes.md).
+
+paths: total number of paths, each in one state.
+hider_range_m: maximum distance in metres of the vehicle behind which a path begins.
+min_speed_mps: minimum forward speed of the ego.
+height_m: height of the pedestrian.
+control: control experiment: 'none', 'nobody' or 'untrained' (docs/explanation/probes.md).
+cases_file: CSV file to write, with one row for each point of each path.
+The other arguments are those of probe_removal().
+
+^C raises KeyboardInterrupt. Raises pictura.Error, which names file and key of an invalid input.
 
 Examples:
     >>> policies, maps = ['models/perspective.safetensors'], ['procedural:1']
@@ -545,14 +596,21 @@ Examples:
       &module, "probe_corner", &probe_corner, &write_corner_cases, &corner_summary_json, &CornerOptions::pairs,
       R"(Measures how policies approach blind corners with a hidden vehicle, and similar empty corners, like `pictura probe corner`.
 
-policies, maps, density, agents_per_world, scenes, steps, sample_steps and the arguments after argmax: as in probe_removal().
-pairs: total number. max_distance_m: maximum distance before the corner at which a policy takes over. min_speed_mps: minimum
-speed of the ego then, and of the hidden vehicle. user_range_m: maximum distance of the hidden vehicle before the junction.
-driver: 'lane' drives the scenes instead of the policies. control: 'none', 'permuted' or 'untrained'. batch: pairs that run at
-once. cases_file: a CSV file for every run. replay, case, cameras: as in probe_removal(); a case is a pair, by default that of
-the example's figure.
-Returns a dict, that of the command's summary.json (docs/explanation/probes.md). ^C raises KeyboardInterrupt. Raises
-pictura.Error naming file and key of bad input.
+A case is a pair of runs: one at a corner that hides a vehicle, and one at a similar empty corner. Returns a dict with
+the contents of the command's summary.json (docs/explanation/probes.md).
+
+pairs: total number of pairs.
+max_distance_m: maximum distance in metres from the corner at which a policy takes over the ego.
+min_speed_mps: minimum speed of the ego at the takeover, and of the hidden vehicle.
+user_range_m: maximum distance in metres from the hidden vehicle to the junction.
+driver: 'lane' drives the scenes until the takeover, instead of the policies.
+control: control experiment: 'none', 'permuted' or 'untrained' (docs/explanation/probes.md).
+batch: number of pairs that run together.
+cases_file: CSV file to write, with one row for each run.
+case: number of the replayed pair; default: the pair in the example figure of `pictura probe corner`.
+The other arguments are those of probe_removal().
+
+^C raises KeyboardInterrupt. Raises pictura.Error, which names file and key of an invalid input.
 
 Examples:
     >>> policies, maps = ['models/perspective.safetensors'], ['procedural:1']
@@ -561,8 +619,8 @@ Examples:
 
 void bind_session(py::module_& module) {
   py::class_<PySession> session(module, "PolicySession", R"(
-Saved policy: evaluates scenes and observations, and holds the world and cameras of its training. One thread at a time, also for
-renderers that are passed to it.
+Saved policy, with the world and cameras of its training. It computes actions from observations and images. Only one
+thread at a time may use a session and the renderers that are passed to it.
 
 Examples:
     >>> session = pictura.PolicySession('models/perspective.safetensors')
@@ -580,15 +638,17 @@ Examples:
         check_process("PolicySession", arguments.num_threads, {});
         return std::make_unique<PySession>(arguments.checkpoint, arguments);
       },
-      R"(checkpoint: a .ckpt file. num_threads: 0 for all. device: 'auto', 'cpu' or 'cuda', the policy's device; simulators, renderers
-and arrays passed to it use the same device. The others as in pictura.evaluate(). Raises pictura.Error naming the file, or
-pictura.UsageError if the policy cannot use these cameras.)");
+      R"(checkpoint: checkpoint or safetensors file.
+device: 'auto', 'cpu' or 'cuda', the device of the policy. Simulators, renderers and arrays that are passed to the
+session must be on this device.
+The other arguments are those of pictura.evaluate().
+Raises pictura.Error, which names the file, and pictura.UsageError if the policy cannot use the given cameras.)");
   session.def_property_readonly("reads_images", [](PySession& self) { return self.session().reads_images(); })
       .def_property_readonly("rig", [](PySession& self) { return self.session().rig(); })
       .def_property_readonly("device", [](PySession& self) { return name_of(self.session().device()); })
       .def(
           "training_world", [](PySession& self) { return dict_of(self.session().training_world()); },
-          "Returns the options with which pictura.Simulator(maps, worlds, **options) creates the world of its "
+          "Returns the options with which pictura.Simulator(maps, worlds, **options) creates worlds like those of the "
           "training.")
       .def(
           "evaluation_world",
@@ -596,21 +656,25 @@ pictura.UsageError if the policy cannot use these cameras.)");
           "Returns the options of the paper's evaluation world: episodes of `steps` steps, fixed conditioning and "
           "lights.")
       .def("make_renderer", &PySession::make_renderer,
-           "Returns a pictura.Renderer of its images, to which the maps must be uploaded; None if the policy reads no "
-           "images.")
+           "Returns a pictura.Renderer for the policy's images; None if the policy reads no images. Upload the "
+           "geometries of the maps to the renderer before its first use.")
       .def("evaluate", &PySession::evaluate, py::arg("observations"), py::kw_only(), py::arg("scene") = nullptr,
            py::arg("views") = py::none(), py::arg("renderer") = py::none(), py::arg("is_drawn") = py::none(),
-           R"(Returns logits float32 [batch, 12] and values float32 [batch], on its device.
+           R"(Returns logits float32 [batch, 12] and values float32 [batch], on the session's device.
 
-observations: arrays [batch, ...] by name, like pictura.Simulator.observations. A policy that reads images also needs scene,
-views [batch] and a renderer from make_renderer(); is_drawn: uint8 [batch], 0 where its images are black. Raises pictura.Error
-naming what is missing or does not fit.)")
-      .def(
-          "make_controller", &PySession::make_controller, py::arg("simulator"), py::arg("renderer") = py::none(),
-          py::arg("argmax") = true, py::arg("seed") = 0,
-          R"(Returns a pictura.Controller that drives in this simulator, which must use the session's device: with the most likely action, or
-draws keyed by seed, world, agent, episode and step as in training. renderer: for a policy that reads images, from
-make_renderer(), with the simulator's geometries. Raises pictura.Error if a geometry or the renderer is missing.)");
+observations: arrays [batch, ...] by name, like pictura.Simulator.observations.
+scene, views, renderer: needed by policies that read images. views is [batch], and the renderer is from make_renderer().
+is_drawn: uint8 [batch], 0 where images are black instead of drawn; default: all images are drawn.
+Raises pictura.Error, which names a missing or invalid argument.)")
+      .def("make_controller", &PySession::make_controller, py::arg("simulator"), py::arg("renderer") = py::none(),
+           py::arg("argmax") = true, py::arg("seed") = 0,
+           R"(Returns a pictura.Controller that drives agents of a simulator with the policy.
+
+simulator: a simulator on the session's device.
+renderer: needed by policies that read images: a renderer from make_renderer(), with the simulator's geometries.
+argmax: whether to take the most likely action. Otherwise actions are sampled as in training, with random numbers keyed
+by seed, world, agent, episode and step.
+Raises pictura.Error if the renderer or one of its geometries is missing.)");
 }
 
 }  // namespace

@@ -83,15 +83,25 @@ py::dict train_from_python(TrainArguments& arguments) {
 void bind_train(py::module_& module) {
   def_with_options<TrainArguments>(
       &module, {"train", {"config", "out"}}, &train_from_python,
-      R"(Trains by self-play like `pictura train`, and writes the same files into the folder `out`.
+      R"(Trains a policy by self-play, like `pictura train`, and writes the same files into the folder `out`.
 
-config: a TOML file (docs/reference/configuration.md). overrides: for instance 'train.updates=2'. old_run: treatment of an
-existing run in `out`, 'refuse', 'resume' or 'overwrite'. init_from: a checkpoint with the initial weights. minutes: wall-time
-limit; 0: none. on_progress: called after every update with a dict: update, updates, agent_steps, agent_steps_per_s,
-episode_return, eta_s, scalars (those of progress.csv). on_notice: called with a text. Both are called from training's own
-thread, and their exceptions end training.
-Returns a dict: agent_steps, updates, agent_steps_per_s, episode_return, km_driven, checkpoint, policy_hash and more. ^C ends
-training after the present update, saves, and raises KeyboardInterrupt. Raises pictura.Error naming file and key of bad input.
+Returns a dict: agent_steps, updates, agent_steps_per_s, episode_return, km_driven, checkpoint, policy_hash and more. ^C
+ends training after the current update, saves a checkpoint, and raises KeyboardInterrupt.
+
+Args:
+    config: A TOML file (docs/reference/configuration.md).
+    out: Folder for the run's files.
+    overrides: Values that replace those in the file, such as 'train.updates=2'.
+    old_run: What happens to an existing run in `out`: 'refuse', 'resume' or 'overwrite'.
+    init_from: A checkpoint whose weights are the initial weights.
+    minutes: Limit of the duration in minutes; 0: none.
+    on_progress: Function that is called after every update with a dict: update, updates, agent_steps,
+        agent_steps_per_s, episode_return, eta_s, and scalars (the columns of progress.csv).
+    on_notice: Function that is called with the text of a notice. Both functions are called from the training's own
+        thread; their exceptions end the training.
+
+Raises:
+    pictura.Error: An input is invalid; the message names file and key.
 
 Examples:
     >>> report = pictura.train('configs/smoke.toml', 'runs/mine', old_run='overwrite')
@@ -104,7 +114,7 @@ Examples:
 }  // namespace pictura::python
 
 PYBIND11_MODULE(PICTURA_TRAINING_MODULE, module) {
-  module.doc() = "Training, evaluation and saved policies, with torch. Use them as names of `pictura`.";
+  module.doc() = "Training, evaluation and saved policies, with torch. Import these names from `pictura`.";
   pictura::python::bind_driving(module);
   pictura::python::bind_train(module);
 }
