@@ -70,7 +70,7 @@ constexpr const char *kOfTraining = "training and evaluation.\n",
 #else
 constexpr const char *kOfTraining =
                          "evaluation.\n"
-                         "This build has no torch, with which policies are trained, and computed on GPUs: pip install "
+                         "This build lacks torch, which trains policies and runs them on GPUs: pip install "
                          "'pictura[train]'.\n",
                      *kExamplesOfTraining = "  pictura evaluate models/vector.safetensors --map procedural:1-8\n";
 #endif
@@ -85,7 +85,7 @@ int run_command(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app{
       std::string("Self-play driving from rendered views: maps, simulation, images, ") + kOfTraining +
-      "MAP is a .xodr file, a Lanelet2 .osm file (FILE.osm@LATITUDE,LONGITUDE: about that place), a CARLA town's name\n"
+      "MAP is a .xodr file, a Lanelet2 .osm file (FILE.osm@LATITUDE,LONGITUDE sets the origin), a CARLA town's name\n"
       "(looked up in $PICTURA_DATA), procedural[:SEED], or city[:SEED]."};
   app.name("pictura");
   app.set_version_flag("--version", PICTURA_VERSION);

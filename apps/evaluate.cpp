@@ -385,13 +385,15 @@ void add_evaluate_command(CLI::App& app) {
       command
           ->add_option(
               "--policy", options.controller,
-              fmt::format("Controller that drives instead of the checkpoint's policy, in its world, or, without a "
-                          "checkpoint, in the paper's world: {}; in recorded scenes {}, random, idle or idm_lanes",
-                          fmt::join(town_controller_names(), ", "), fmt::join(record_controller_names(), ", ")))
+              fmt::format(
+                  "Controller that drives instead of the checkpoint's policy: {}; in recorded scenes {}, random, idle "
+                  "or idm_lanes. The world is that of the checkpoint's training, or without a checkpoint the paper's",
+                  fmt::join(town_controller_names(), ", "), fmt::join(record_controller_names(), ", ")))
           ->check(one_of(host_controller_names()));
   command
       ->add_option("--merge", arguments->parts,
-                   "Instead of evaluating: merge parts of one evaluation, written by --out, without loss")
+                   "Instead of evaluating: merge the parts of one evaluation, which --out wrote; the result is exactly "
+                   "that of the whole evaluation")
       ->excludes(checkpoint)
       ->excludes(policy);
   add_evaluation_options(command, &arguments->evaluation)->excludes(policy);
@@ -399,34 +401,36 @@ void add_evaluate_command(CLI::App& app) {
   add_decision_steps_option(command, &options.decision_steps)->excludes(policy);
   command
       ->add_option("--density", arguments->densities,
-                   "light, medium, dense: 60, 120, 150 agents per world; with --protocol the shares of road users that "
-                   "remain, in %, for instance 100,75,50; default: the protocol's")
+                   "light, medium, dense: 60, 120, 150 agents per world; with --protocol: percentages of road users "
+                   "that remain, for instance 100,75,50; default: those of the protocol")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();
   command
       ->add_option("--others", options.others,
-                   fmt::format("Other drivers, for instance lane=0.25,models/vector.safetensors=0.25: policy files or "
-                               "{}, each with its share of vehicles; or the policy itself while impaired, with its "
-                               "share of agents: {}. A table row per driver gives its metrics",
+                   fmt::format("Other drivers with their shares of vehicles, for instance "
+                               "lane=0.25,models/vector.safetensors=0.25: policy files or {}. Or shares of agents that "
+                               "the policy drives while impaired: {}. The report has metrics of each driver",
                                fmt::join(town_controller_names(), ", "), fmt::join(impairment_names(), ", ")))
       ->delimiter(',')
       ->allow_extra_args(false);
   command
       ->add_option("--scenarios", arguments->scenarios,
-                   "Scenarios per density: N, or A:B for the range from A up to, but excluding, B; with --protocol "
-                   "scenes; default: all")
+                   "Scenarios per density: N, or A:B for scenarios A to B - 1; with --protocol: scenes, default: all")
       ->capture_default_str();
-  CLI::Option* const rig = command->add_option(
-      "--rig", options.rig, "Rig file with as many cameras as in training, instead of the cameras of training");
+  CLI::Option* const rig =
+      command->add_option("--rig", options.rig,
+                          "Rig file, whose cameras replace the cameras of the training; their number must be the same");
   rig->excludes(policy);
-  command->add_option("--size", arguments->size, "Pixels of an image, WxH, of the paper's rig; default: as in training")
+  command
+      ->add_option("--size", arguments->size, "Image size of the paper's rig in pixels, WxH; default: as in training")
       ->excludes(rig)
       ->excludes(policy);
   command
       ->add_option("--camera-severity", arguments->severities,
-                   fmt::format("Randomizes cameras, by 0 (as mounted) to {}, 1 in full (docs/explanation/cameras.md): "
-                               "one number, or several separated by commas, a row each, for instance 0,0.25,0.5,1",
+                   fmt::format("Severity of randomized cameras, from 0 (as mounted) over 1 (full randomization) to {} "
+                               "(docs/explanation/cameras.md); several numbers, separated by commas, give one result "
+                               "each, for instance 0,0.25,0.5,1",
                                kMaxCameraSeverity))
       ->delimiter(',')
       ->transform(number(0, kMaxCameraSeverity))
@@ -436,13 +440,17 @@ void add_evaluate_command(CLI::App& app) {
                       "Path of the program of policy.backbone, if it has moved since training");
   command->add_option("--out", arguments->out, "File for the counts of each scenario or scene, for --merge");
   command
-      ->add_option("--infractions", arguments->infractions,
-                   "File for every infraction: place, partner, speed; and a table of the most frequent kinds")
+      ->add_option(
+          "--infractions", arguments->infractions,
+          "File with the place, partner and speed of every infraction; also prints a table of the most frequent kinds")
       ->check(file_ending(".csv"));
-  command->add_option("--replay", arguments->replay, "Record the worst scenario again, as a page for browsers")
+  command
+      ->add_option("--replay", arguments->replay,
+                   "Simulate the worst scenario again, and record it as a page for browsers")
       ->check(file_ending(".html"));
-  CLI::Option* const replays = add_number_option(command, "--replays", arguments->replays,
-                                                 "Record the N worst scenarios again, into --gallery", 1);
+  CLI::Option* const replays =
+      add_number_option(command, "--replays", arguments->replays,
+                        "Simulate the N worst scenarios again, and record them in --gallery", 1);
   CLI::Option* const gallery = command->add_option(
       "--gallery", arguments->gallery,
       "Folder for the pages of --replays and their index; replaces the pages of an earlier gallery");
@@ -461,7 +469,7 @@ void add_evaluate_command(CLI::App& app) {
       "  pictura evaluate run.ckpt --density medium --scenarios 40 --others lane=0.3,idm_lanes=0.2\n"
       "  pictura evaluate run.ckpt --density medium --scenarios 40 --camera-severity 0,0.25,0.5,1\n"
       "  pictura evaluate run.ckpt --protocol robust\n"
-      "In parts, on several machines or in sequence:\n"
+      "Evaluation in parts, on several machines or one after another:\n"
       "  pictura evaluate run.ckpt --scenarios 0:100 --out a.json\n"
       "  pictura evaluate run.ckpt --scenarios 100:200 --out b.json\n"
       "  pictura evaluate --merge a.json b.json\n"

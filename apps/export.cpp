@@ -25,11 +25,12 @@ void add_export_command(CLI::App& app) {
       ->capture_default_str();
   add_average_option(command, &arguments->average);
   command->add_option("--size", arguments->size,
-                      "Pixels of an image, WxH, an integer multiple of the policy's size: its first convolution is "
-                      "spread over patches larger by the same factor; default: unchanged");
+                      "New image size in pixels, WxH, an integer multiple of the policy's image size; the first "
+                      "convolution is spread over patches that are larger by the same factor; default: unchanged");
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "The file holds what the policy needs to drive: weights, configuration, cameras. simulate, evaluate, replay and\n"
+      "The file contains all data with which the policy drives: weights, configuration, cameras. simulate, evaluate, "
+      "replay and\n"
       "train --init-from accept it in place of a checkpoint; a run cannot be resumed from it. ONNX models are written "
       "in\n"
       "Python: pictura.torch.export_onnx(pictura.torch.load_policy(POLICY), \"policy.onnx\").\n"

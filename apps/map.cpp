@@ -219,20 +219,24 @@ void add_map_command(CLI::App& app) {
   command->add_option("--svg", arguments->svg, "Draw the same picture as vector graphics")->check(file_ending(".svg"));
   add_number_option(command, "--size", arguments->size_px, "Longer side of the picture in pixels", 64, 16384);
   CLI::Option* box =
-      command->add_option("--box", arguments->box, "Draw only this part: two corners, in the file's metres")
+      command
+          ->add_option("--box", arguments->box,
+                       "Draw only the rectangle between two corners, in metres of the file's coordinates")
           ->expected(4)
           ->transform(number(-kFarthest_m, kFarthest_m))
           ->type_name("X0 Y0 X1 Y1");
-  CLI::Option* at =
-      command->add_option("--at", arguments->at, "Draw the surroundings of this point, in the file's metres")
-          ->expected(2)
-          ->transform(number(-kFarthest_m, kFarthest_m))
-          ->type_name("X Y")
-          ->excludes(box);
+  CLI::Option* at = command
+                        ->add_option("--at", arguments->at,
+                                     "Draw the surroundings of this point, in metres of the file's coordinates")
+                        ->expected(2)
+                        ->transform(number(-kFarthest_m, kFarthest_m))
+                        ->type_name("X Y")
+                        ->excludes(box);
   add_number_option(command, "--radius", arguments->radius_m, "Radius around --at, in metres", 0.5, kFarthest_m)
       ->needs(at);
   command
-      ->add_option("--xodr", arguments->xodr, "Write the map as OpenDRIVE, with only the elements used by the importer")
+      ->add_option("--xodr", arguments->xodr,
+                   "Write the map as OpenDRIVE, with only those elements that the importer uses")
       ->check(file_ending(".xodr"));
   command->add_flag("--strict", arguments->strict,
                     "Reject every fault of the file, including faults that are repaired by default");

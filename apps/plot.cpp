@@ -23,16 +23,17 @@ void add_plot_command(CLI::App& app) {
   command->add_option("RUN", arguments->runs, "Folders written by pictura train --out");
   CLI::Option* const evaluations =
       command
-          ->add_option("--evaluations", arguments->evaluations,
-                       "Instead of runs: a file of evaluations during training, as written by scripts/reproduce_table "
-                       "--curves; five metrics of the protocol, a line at medium density in a band of all densities")
+          ->add_option(
+              "--evaluations", arguments->evaluations,
+              "Instead of runs: a file of evaluations during training, which scripts/reproduce_table --curves wrote; "
+              "draws five metrics of the protocol, with a line for medium density and a band over all densities")
           ->check(CLI::ExistingFile)
           ->excludes("RUN");
   CLI::Option* const severities =
       command
           ->add_option("--severities", arguments->severities,
-                       "Instead of runs: output of evaluate --camera-severity --json; metrics of the protocol by "
-                       "severity, a line for each file and density in its 95 % interval")
+                       "Instead of runs: outputs of evaluate --camera-severity --json; draws metrics of the protocol "
+                       "by severity, with a line and its 95 % interval for each file and density")
           ->check(CLI::ExistingFile)
           ->excludes("RUN")
           ->excludes(evaluations);
@@ -40,8 +41,9 @@ void add_plot_command(CLI::App& app) {
       ->check(file_ending(".png", ".svg"))
       ->capture_default_str();
   command
-      ->add_option("--x", arguments->x,
-                   "Horizontal axis: agent-steps, or hours of rollouts and updates (for evaluations: of one GPU)")
+      ->add_option(
+          "--x", arguments->x,
+          "Horizontal axis: agent-steps, or hours of rollouts and updates (for --evaluations: hours of one GPU)")
       ->check(one_of({"agent_steps", "hours"}).description("{agent_steps,hours}"))
       ->capture_default_str()
       ->excludes(severities);
@@ -55,8 +57,8 @@ void add_plot_command(CLI::App& app) {
       ->excludes(severities);
   command
       ->add_option("--group", arguments->group,
-                   "seeds: runs whose config.toml differ only in run.seed are one line, their mean, with a band from "
-                   "the lowest to the highest; none: one line per run")
+                   "seeds: one line for all runs whose config.toml differ only in run.seed: their mean, with a band "
+                   "from minimum to maximum; none: one line per run")
       ->check(one_of({"seeds", "none"}).description("{seeds,none}"))
       ->capture_default_str()
       ->excludes(evaluations)
@@ -64,9 +66,10 @@ void add_plot_command(CLI::App& app) {
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "docs/reference/run_folder.md lists the columns. With many updates, points are means of consecutive updates.\n"
-      "A mean ends where the first of its runs does.\n"
-      "Python 3.11 with Matplotlib draws (PICTURA_PYTHON gives its path). Without it the data is written to OUT.json,\n"
-      "and the status is 1.\n"
+      "The mean of several runs ends where the shortest run ends.\n"
+      "Charts need Python 3.11 with Matplotlib; PICTURA_PYTHON is the path of the interpreter. Without Matplotlib, "
+      "the\n"
+      "data is written to OUT.json, and the status is 1.\n"
       "Examples:\n"
       "  pictura plot runs/a runs/b --out curves.png\n"
       "  pictura plot runs/town01_seed* --x hours --metrics episode_return,off_road_per_km\n"

@@ -42,11 +42,11 @@ constexpr std::array<const char*, 3> kCornerExamples{
     "pictura probe corner agent.safetensors --map procedural:1,procedural:2 --density light --pairs 10 --min-speed 1"};
 
 constexpr const char* kCaseOfReplay =
-    "Case of --replay, as numbered in cases.csv; default: where the first policy's value changes most";
+    "Number in cases.csv of the case for --replay; default: the case in which the first policy's value changes most";
 
 std::string footer(const std::array<const char*, 3>& examples) {
   return fmt::format(
-      "docs/explanation/probes.md explains the method, docs/how-to/probe.md the files.\n"
+      "docs/explanation/probes.md explains the method, and docs/how-to/probe.md explains the files.\n"
       "Examples:\n  {}",
       fmt::join(examples, "\n  "));
 }
@@ -66,14 +66,14 @@ void add_options(CLI::App* command, ProbeArguments<Probe>* arguments, const std:
   Probe& probe = arguments->probe;
   command
       ->add_option("POLICY", probe.policies,
-                   "Checkpoints written by train, or safetensors; the world is the first policy's")
+                   "Checkpoints written by train, or safetensors; the world is that of the first policy's training")
       ->required();
   add_evaluation_options(command, &probe.worlds);
   visit_options(probe, FlagAdder(command));
   add_case_replay_options(command, &arguments->replay, case_help);
   arguments->out = "probe_" + command->get_name();
   command->add_option("--out", arguments->out, "Folder for " + files)->capture_default_str();
-  command->add_flag("--json", arguments->json, "Print one JSON object, that of summary.json");
+  command->add_flag("--json", arguments->json, "Print the JSON object of summary.json");
   command->footer(footer(examples));
 }
 
@@ -176,8 +176,8 @@ void report(const ProbeArguments<Probe>& arguments, const std::string& summary, 
 
 void add_removal_command(CLI::App& probe) {
   auto arguments = std::make_shared<ProbeArguments<RemovalOptions>>();
-  CLI::App* command =
-      probe.add_subcommand("removal", "How value and braking change when one road user is removed, by its occlusion");
+  CLI::App* command = probe.add_subcommand(
+      "removal", "Measure how value and braking change when one road user is removed, by its occlusion");
   add_options(command, arguments.get(), kCaseOfReplay, "cases.csv, summary.json and removal.png", kRemovalExamples);
   command->callback([arguments] {
     check_case_number(arguments->replay, arguments->probe.removals);
@@ -198,7 +198,8 @@ void add_removal_command(CLI::App& probe) {
 void add_pedestrian_command(CLI::App& probe) {
   auto arguments = std::make_shared<ProbeArguments<PedestrianOptions>>();
   CLI::App* command = probe.add_subcommand(
-      "pedestrian", "How value and braking change as a pedestrian emerges from behind a vehicle and is hidden again");
+      "pedestrian",
+      "Measure how value and braking change as a pedestrian emerges from behind a vehicle and is hidden again");
   add_options(command, arguments.get(), kCaseOfReplay,
               "cases.csv, summary.json, pedestrian.png and path_000.png, path_001.png, ...", kPedestrianExamples);
   command->callback([arguments] {
@@ -229,8 +230,9 @@ void add_pedestrian_command(CLI::App& probe) {
 void add_corner_command(CLI::App& probe) {
   auto arguments = std::make_shared<ProbeArguments<CornerOptions>>();
   CLI::App* command = probe.add_subcommand(
-      "corner", "How policies approach blind corners with a hidden vehicle, and similar empty corners");
-  add_options(command, arguments.get(), "Pair of --replay, as numbered in cases.csv; default: the pair of example.png",
+      "corner", "Measure how policies approach blind corners with a hidden vehicle, and similar empty corners");
+  add_options(command, arguments.get(),
+              "Number in cases.csv of the pair for --replay; default: the pair in example.png",
               "cases.csv, summary.json, corner.png and example.png", kCornerExamples);
   command->callback([arguments] {
     check_case_number(arguments->replay, arguments->probe.pairs);
@@ -256,7 +258,8 @@ void add_corner_command(CLI::App& probe) {
 }  // namespace
 
 void add_probe_command(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("probe", "Probe what policies respond to: removal, pedestrian, corner");
+  CLI::App* command =
+      app.add_subcommand("probe", "Measure policies' responses to road users: removal, pedestrian, corner");
   command->require_subcommand(1);
   command->footer(footer({kRemovalExamples[0], kPedestrianExamples[0], kCornerExamples[0]}));
   add_removal_command(*command);

@@ -231,27 +231,30 @@ void add_render_command(CLI::App& app) {
   add_world_options(command, &arguments->world);
   add_light_cycles_option(command, &arguments->world.light_cycles, name_of(SimulatorConfig{}.light_cycles));
   add_light_heads_option(command, &arguments->world.light_heads);
-  add_number_option(command, "--steps", arguments->steps, "Steps of random actions before the pictures", 0);
+  add_number_option(command, "--steps", arguments->steps,
+                    "Number of steps with random actions before the images are drawn", 0);
   add_number_option(command, "--views", arguments->views, "Number of agents whose cameras are drawn", 1);
   add_scene_options(command, &arguments->world);
-  command->add_option("--tracks", arguments->tracks,
-                      "Tracks of a recorded scene whose cameras are drawn, among those present at --start: self, "
-                      "vehicles (the others), others (non-vehicles), all, tracks_to_predict, objects_of_interest, and "
-                      "ids, separated by commas; default: self, or the first track if the file does not mark self");
+  command->add_option(
+      "--tracks", arguments->tracks,
+      "Tracks of a recorded scene whose cameras are drawn, separated by commas: self (the self-driving car), vehicles "
+      "(all other vehicles), others (non-vehicles), all, tracks_to_predict, objects_of_interest, and ids; only tracks "
+      "that are present at --start; default: self, or the first track if the file does not mark self");
   CLI::Option* size =
       command->add_option("--size", arguments->size, "Image size in pixels, WxH")->capture_default_str();
   command->add_flag("--square-pixels", arguments->square_pixels,
-                    "At sizes that are not 16:9, keep pixels square and the horizontal field of view");
+                    "If the image size is not 16:9, keep pixels square and keep the horizontal field of view");
   add_backend_options(command, "auto", &arguments->world);
   command->add_option("--rig", arguments->rig, "TOML file with [[camera]] tables instead of the paper's four cameras");
   add_number_option(command, "--line-floor", arguments->line_floor_px,
-                    "Minimum width of a line on screen in pixels; 0: no minimum", 0, kMaxLineFloor_px);
+                    "Minimum width of a line in images, in pixels; 0: no minimum", 0, kMaxLineFloor_px);
   command->add_option("--planes", arguments->planes, "Also write these planes as pictures: depth, class, instance")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(one_of({"depth", "class", "instance"}));
   command->add_flag("--figure", arguments->figure,
-                    "Also write VIEW.png, its first camera enlarged with a caption, and figure.png with all of them");
+                    "Also write VIEW.png for each view, with the enlarged image of its first camera and a caption, and "
+                    "figure.png, which combines these pictures");
   command->add_option("--out", arguments->out, "Folder for the pictures; pictures of an earlier call are removed")
       ->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");

@@ -96,8 +96,8 @@ void add_replay_command(CLI::App& app) {
   CLI::Option* const out = command->add_option("--out", arguments->out, "Page to write")->check(file_ending(".html"));
   CLI::Option* const gallery =
       command->add_option("--gallery", arguments->gallery,
-                          "Instead of one page: a folder for pages of several seeds and an index of all replays in it, "
-                          "worst first; replaces the pages of an earlier gallery");
+                          "Instead of one page: folder for a page of each seed, and an index that lists the worst "
+                          "replay first; replaces the pages of an earlier gallery");
   gallery->excludes(out);
   command->add_option("--mcap", arguments->mcap, "Also write an MCAP file, for Foxglove; with or without a page")
       ->check(file_ending(".mcap"))
@@ -106,7 +106,7 @@ void add_replay_command(CLI::App& app) {
                     10000);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "The page holds everything: it opens from disk, in any browser, without a network.\n"
+      "The page is self-contained: any browser opens it from disk, without a network.\n"
       "Examples:\n  pictura replay Town01 --agents 120 --steps 1200 --out lane.html\n"
       "  pictura replay procedural:1 --policy runs/demo/checkpoint.ckpt --follow 3 --cameras --out demo.html\n"
       "  pictura replay Town01 --steps 300 --cameras --mcap drive.mcap\n"

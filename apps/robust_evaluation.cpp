@@ -50,12 +50,13 @@ void print_table(const RobustReport& report, int scenarios) {
     print_row(report, part == "all" ? "all but carla" : "all of " + part, row);
   }
   print_result(
-      "goals are a vehicle's mean, goals kept their share of the first row's; at fault to never moved are shares of "
+      "goals: mean per vehicle; goals kept: ratio to the goals of the first row; at fault to never moved: shares of "
       "vehicles\n");
-  print_result("+- is the half width of a 95 % confidence interval over {} scenarios of {} steps a condition\n",
+  print_result("+- is the half width of a 95 % confidence interval over {} scenarios of {} steps per condition\n",
                scenarios, kRobustSteps);
   if (scenarios != kRobustScenarios) {
-    print_result("a trial: only {} scenarios a condition are comparable with others' numbers\n", kRobustScenarios);
+    print_result("a trial: results are comparable with others' results only for {} scenarios per condition\n",
+                 kRobustScenarios);
   }
 }
 

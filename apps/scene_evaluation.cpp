@@ -132,37 +132,39 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments) {
     rules.push_back(fmt::format("{} ({}): {}", rule.name, rule.values, rule.what));
   }
   command
-      ->add_option("--protocol", arguments->protocol,
-                   fmt::format("Evaluate in recorded scenes instead of on maps: womd, the paper's zero-shot protocol, "
-                               "or, with their settings, {}; or {}: in generated towns, with other drivers and "
-                               "randomized cameras, all settings fixed, so that drivers can be compared",
-                               fmt::join(names.begin() + 1, names.end(), ", "), kRobustProtocol))
+      ->add_option(
+          "--protocol", arguments->protocol,
+          fmt::format("Evaluate in recorded scenes instead of on maps: womd, the paper's zero-shot protocol, or {}, "
+                      "with the settings of these benchmarks. Or {}: evaluate in generated towns, with other drivers "
+                      "and randomized cameras; all settings are fixed, so that results are comparable",
+                      fmt::join(names.begin() + 1, names.end(), ", "), kRobustProtocol))
       ->check(one_of(protocols));
   command
       ->add_option("--scenes", arguments->scenes,
                    "Scenes of the protocol: files, folders of files, FILE#K or FILE#SCENARIO_ID, separated by commas")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--control", arguments->control,
-                      "Driven tracks: self (or sdc), vehicles (the others), others (non-vehicles), all, "
-                      "tracks_to_predict, objects_of_interest, and ids, separated by commas; default: the protocol's");
-  add_number_option(command, "--start", arguments->start_step, "Start step in recordings; default: the protocol's", 0,
+  command->add_option(
+      "--control", arguments->control,
+      "Driven tracks, separated by commas: self or sdc (the self-driving car), vehicles (all other vehicles), others "
+      "(non-vehicles), all, tracks_to_predict, objects_of_interest, and ids; default: those of the protocol");
+  add_number_option(command, "--start", arguments->start_step,
+                    "Step of the recordings at which episodes begin; default: that of the protocol", 0,
                     kMaxScenarioSteps - 1);
   command
       ->add_option("--rule", arguments->rules,
-                   fmt::format("NAME=VALUE in place of a setting of the protocol; may be given several times. {}",
+                   fmt::format("NAME=VALUE, which replaces a setting of the protocol; may be given several times. {}",
                                fmt::join(rules, "; ")))
       ->allow_extra_args(false);
   command->add_option("--csv", arguments->csv, "File with a row for every driven road user of every scene")
       ->check(file_ending(".csv"));
   command->add_option(
       "--rollouts", arguments->rollouts,
-      "File for the rollouts, in the format of the Waymo sim-agents challenge: with --protocol simagents");
+      "With --protocol simagents: file for the rollouts, in the format of the Waymo sim-agents challenge");
   command
-      ->add_option(
-          "--realism", arguments->realism,
-          "Score how realistic the rollouts are, by the weights of the challenge of that year: with --protocol "
-          "simagents; pictura score does the same for a file of rollouts")
+      ->add_option("--realism", arguments->realism,
+                   "With --protocol simagents: score how realistic the rollouts are, with the weights of the challenge "
+                   "of this year; pictura score does the same for a file of rollouts")
       ->check(one_of(realism_version_names()));
 }
 

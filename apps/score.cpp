@@ -60,7 +60,7 @@ void add_score_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("score", "Score how realistic rollouts of recorded scenes are");
   command
       ->add_option("ROLLOUTS", arguments->rollouts,
-                   "A file as evaluate --rollouts writes it, or a submission to the Waymo sim-agents challenge")
+                   "Output of evaluate --rollouts, or a submission to the Waymo sim-agents challenge")
       ->required()
       ->check(CLI::ExistingFile);
   command
@@ -69,13 +69,13 @@ void add_score_command(CLI::App& app) {
       ->required()
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--realism", arguments->version, "Whose weights count, by the challenge's year")
+  command->add_option("--realism", arguments->version, "Year of the challenge whose weights are used")
       ->check(CLI::IsMember(realism_version_names()).description("{2024,2025}"))
       ->capture_default_str();
   add_threads_option(command, &arguments->num_threads);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "docs/explanation/realism.md defines the numbers. Scenes that the file lacks are counted and left out.\n"
+      "docs/explanation/realism.md defines the numbers. Scenes without rollouts in the file are counted and left out.\n"
       "Examples:\n"
       "  pictura evaluate models/vector.safetensors --protocol simagents --scenes validation --sampled --rollouts "
       "r.binproto\n"

@@ -268,25 +268,26 @@ void add_simulate_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("simulate", "Drive a world and count what happens");
   add_driving_options(command, &arguments->world, &arguments->steps, &arguments->policy);
   command->add_option("--video", arguments->video,
-                      "Film the world into this .mp4 or .gif: from above, with goals, lights and the reasons of halts, "
-                      "and from one agent's cameras");
+                      "Film to write (.mp4 or .gif): the world from above, with goals, lights and reasons of halts, "
+                      "and one agent's camera images");
   add_number_option(command, "--film-width", arguments->film_width_m,
-                    "Width shown from above, in metres; 0: the whole map", 0, 1e5);
+                    "Width of the area that the film shows from above, in metres; 0: the whole map", 0, 1e5);
   add_number_option(command, "--film-agent", arguments->film_agent,
-                    "Agent that the film follows; default: 0, in recorded scenes the self-driving car", 0);
+                    "Agent that the film follows; default: agent 0, or the self-driving car in recorded scenes", 0);
   command->add_option("--replay", arguments->replay, "Record the world as a page for browsers")
       ->check(file_ending(".html"));
   command->add_option("--mcap", arguments->mcap, "Also write an MCAP file, for Foxglove")->check(file_ending(".mcap"));
   command
       ->add_option("--scene", arguments->scene,
-                   "Save the first episode as a recorded scene for SCENE: bit-exact, with recorded lights")
+                   "Save the first episode as a recorded scene (*.scenario), with its lights; a replay of the scene is "
+                   "bit-exact")
       ->check(file_ending(std::string(kSceneFileEnding)));
   add_serve_options(command, &arguments->serve);
   add_recording_options(command, &arguments->recording);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "agent_steps_per_s counts the whole loop, policy and its images included, without film and replay;\n"
-      "simulator_agent_steps_per_s counts the simulator alone.\n"
+      "agent_steps_per_s includes the simulator, the policy and its images, but not film and replay;\n"
+      "simulator_agent_steps_per_s includes only the simulator.\n"
       "Examples:\n  pictura simulate Town01 --agents 80 --steps 600 --policy random --json\n"
       "  pictura simulate procedural:1 --policy runs/demo/checkpoint.ckpt --video drive.mp4\n"
       "  pictura simulate Town05 --agents 60 --policy lane --serve --cameras\n"

@@ -21,8 +21,9 @@ void add_town_command(CLI::App& app) {
   std::vector<std::string> families;
   for (const TownFamily& family : town_families()) families.emplace_back(family.name);
   command
-      ->add_option("--family", arguments->family,
-                   "Family of towns that sets the defaults; below are the defaults of procedural")
+      ->add_option(
+          "--family", arguments->family,
+          "Family of towns, which sets the defaults of the other options; this help shows the defaults of procedural")
       ->check(CLI::IsMember(families))
       ->capture_default_str();
   command->add_option("--blocks", arguments->blocks, "Blocks of houses along x and y, as AxB")->capture_default_str();
@@ -33,7 +34,7 @@ void add_town_command(CLI::App& app) {
   command->add_option("--out", arguments->out, ".xodr file to write")->check(file_ending(".xodr"))->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "A share above 0 selects at least one.\n"
+      "An option that is a share selects at least one element if it is above 0.\n"
       "Examples:\n"
       "  pictura town --seed 7 --blocks 4x3 --out town.xodr && pictura map town.xodr --png town.png\n"
       "  pictura town --roundabouts 1 --ring-road 0 --hills-m 0 --out roundabouts.xodr\n"

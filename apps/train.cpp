@@ -20,7 +20,7 @@ void add_train_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("train", "Train a policy by self-play (PPO)");
   command
       ->add_option("--config", arguments->train.config_path,
-                   "TOML file; configs/ holds smoke, demo, town01, agent and paper")
+                   "TOML file; configs/ contains smoke.toml, demo.toml, town01.toml, agent.toml and paper.toml")
       ->required();
   command
       ->add_option("--set", arguments->train.overrides,
@@ -34,17 +34,19 @@ void add_train_command(CLI::App& app) {
                  "Start a new run; the existing run in --out is removed once the new run has a checkpoint")
       ->excludes(resume);
   command
-      ->add_option("--init-from", arguments->train.init_from,
-                   "Start with the weights of this checkpoint or safetensors, of the same network at any image size")
+      ->add_option(
+          "--init-from", arguments->train.init_from,
+          "Checkpoint or safetensors file with the initial weights; it must have the same network, at any image size")
       ->excludes(resume);
-  add_number_option(
-      command, "--minutes", arguments->train.minutes,
-      "Save and end before this wall time is over, estimated from the longest update so far; continue with --resume",
-      1e-9, 1e9);
+  add_number_option(command, "--minutes", arguments->train.minutes,
+                    "Limit of the wall time: saves and ends before an update that may exceed it, as estimated from the "
+                    "longest update so far; continue with --resume",
+                    1e-9, 1e9);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
-      "Several processes train one policy, each on its own GPU, if torchrun, srun or the variables RANK, WORLD_SIZE,\n"
-      "LOCAL_RANK, MASTER_ADDR and MASTER_PORT define them; sizes are totals over all, and rank 0 reports and writes.\n"
+      "Several processes can train one policy, each on its own GPU: torchrun, srun or the variables RANK, WORLD_SIZE,\n"
+      "LOCAL_RANK, MASTER_ADDR and MASTER_PORT define them. Sizes are totals of all processes. Rank 0 reports and "
+      "writes.\n"
       "Examples:\n"
       "  pictura train --config configs/demo.toml --out runs/demo\n"
       "  pictura train --config configs/town01.toml --set run.seed=3 --set train.updates=50 --out runs/seed3\n"

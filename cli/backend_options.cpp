@@ -33,9 +33,9 @@ void add_backend_options(CLI::App* command, const std::string& otherwise, Sessio
     return parse_pixel_samples(text) ? "" : fmt::format("expected {}, got '{}'", kPixelSamplesExpected, text);
   };
   command
-      ->add_option(
-          "--samples", options_out->samples,
-          "Samples per pixel, for gl: 1, N (MSAA) or NxN (supersampling); other renderers compute exact coverage")
+      ->add_option("--samples", options_out->samples,
+                   "Samples per pixel of the renderer gl: 1, N (MSAA) or NxN (supersampling); other renderers compute "
+                   "exact coverage")
       ->check(CLI::Validator(complaint, ""));
 }
 

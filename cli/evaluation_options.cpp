@@ -14,17 +14,17 @@ CLI::Option* add_evaluation_options(CLI::App* command, EvaluateOptions* options_
   EvaluateOptions& options = *options_out;
   options.maps = Config().simulator.maps;
   add_map_list_option(command, &options.maps,
-                      "Maps of the scenarios, separated by commas; procedural:1-64 is a town for each seed");
+                      "Maps of the scenarios, separated by commas; procedural:1-64 means one town for each seed");
   add_number_option(command, "--agents", options.agents_per_world,
-                    "Agents per world, instead of the densities' numbers", 1, kMaxAgentsPerWorld);
+                    "Number of agents per world, instead of the numbers of the densities", 1, kMaxAgentsPerWorld);
   add_number_option(command, "--steps", options.steps, "Steps of 0.1 s per scenario", 1);
   CLI::Option* const sampled = add_sampled_option(command, &options.argmax);
   add_seed_option(command, &options.seed, "Seed of the scenarios");
-  add_policy_backend_options(command, "auto, and as in training", &options);
+  add_policy_backend_options(command, "auto, but as in training for the renderer", &options);
   command
       ->add_option("--conditioning", options.conditioning,
-                   "Conditioning of every agent, for instance collision=1, instead of a value of the configuration's "
-                   "[evaluate.conditioning]; may be given several times")
+                   "Value that replaces one of the configuration's [evaluate.conditioning] for every agent, for "
+                   "instance collision=1; may be given several times")
       ->allow_extra_args(false);
   add_light_cycles_option(command, &options.light_cycles, "as in training");
   add_light_heads_option(command, &options.light_heads);

@@ -20,8 +20,7 @@ void add_map_or_scene(CLI::App* command, std::string* map_out, const std::string
           fmt::format(
               "A .xodr or .osm file, a town's name, procedural[:SEED], city[:SEED], the N-th affine copy of one "
               "of these (MAP#N), {}or a recorded scene: FILE.json, "
-              "FILE.bin, FILE.scenario, FILE.tfrecord[#K] or FOLDER[#K], with a number or a "
-              "scenario's id as K",
+              "FILE.bin, FILE.scenario, FILE.tfrecord[#K] or FOLDER[#K], where K is a number or a scenario's id",
               more))
       ->required();
 }

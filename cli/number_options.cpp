@@ -38,7 +38,7 @@ CLI::Option* add_seed_option(CLI::App* command, uint64_t* seed_out, const std::s
 }
 
 CLI::Option* add_threads_option(CLI::App* command, int* num_threads_out) {
-  return add_number_option(command, "--threads", *num_threads_out, "Host threads; 0: all", 0, kMaxThreads);
+  return add_number_option(command, "--threads", *num_threads_out, "Number of CPU threads; 0: all", 0, kMaxThreads);
 }
 
 }  // namespace pictura

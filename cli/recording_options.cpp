@@ -8,16 +8,17 @@ namespace pictura {
 void add_recording_options(CLI::App* command, RecordingOptions* options_out) {
   add_number_option(
       command, "--follow", options_out->followed,
-      "Agent whose decisions and images the replay holds, and with which it opens; default: 0, in recorded scenes the "
-      "self-driving car, in evaluated scenarios the agent with the most severe infraction",
+      "Agent that the replay shows first, and whose decisions and images it contains; default: agent 0; in recorded "
+      "scenes the self-driving car; in evaluated scenarios the agent with the most severe infraction",
       0, kMaxAgentsPerWorld - 1);
   add_cameras_option(command, options_out);
 }
 
 CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out) {
-  return command->add_flag("--cameras", options_out->cameras,
-                           "Also keep the followed agent's images, lossless: with the cameras of its policy's "
-                           "training, otherwise the paper's. A page holds 10 MB of images and draws the others");
+  return command->add_flag(
+      "--cameras", options_out->cameras,
+      "Also record the followed agent's images, losslessly, with the cameras of its policy's training, or with the "
+      "paper's cameras if there is no policy. A page contains at most 10 MB of images and draws the others itself");
 }
 
 void reject_recording_options(const CLI::App& command, const std::string& needed) {

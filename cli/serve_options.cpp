@@ -26,14 +26,14 @@ void add_serve_options(CLI::App* command, ServeOptions* options_out) {
               fail_usage("--serve: expected a port of 1 to 65535, got '{}'", text);
             options_out->port = static_cast<int>(*port);
           },
-          "Let a browser watch, pause, step and drive: prints the page's address, reachable only from this machine. "
-          "The simulation begins when a page opens, runs in real time, and without --steps runs until ^C. Default "
-          "port: a free one")
+          "Show a live page in the browser, which can pause and step the simulation and drive an agent. Prints the "
+          "page's address, which is reachable only from this machine. The simulation begins when a page opens, and "
+          "runs in real time. Without --steps it runs until ^C. Default port: a free one")
       ->type_name("[PORT]")
       ->expected(0, 1);
   command->add_option("--serve-host", options_out->host_name,
-                      "With --serve: listen on all of this machine's addresses, for pages that use this host name. "
-                      "Anyone with the address can then drive; nothing is encrypted");
+                      "With --serve: listen on all network interfaces, for browsers that reach this machine by this "
+                      "host name. Anyone with the page's address can then drive; nothing is encrypted");
 }
 
 }  // namespace pictura

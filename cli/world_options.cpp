@@ -12,8 +12,8 @@
 namespace pictura {
 
 void add_world_options(CLI::App* command, WorldOptions* options_out) {
-  add_number_option(command, "--agents", options_out->agents, "Vehicles, cyclists and pedestrians in the world", 1,
-                    kMaxAgentsPerWorld);
+  add_number_option(command, "--agents", options_out->agents,
+                    "Number of agents (vehicles, cyclists and pedestrians) in the world", 1, kMaxAgentsPerWorld);
   // The default is the value that the command presets if there is one, else the value of the policy's training, else
   // the simulator's default.
   const SimulatorConfig simulator;
@@ -21,16 +21,18 @@ void add_world_options(CLI::App* command, WorldOptions* options_out) {
     return fmt::format("{}; default: {}{}", what, preset.value_or(simulators),
                        preset ? "" : ", or, with a trained policy, as in training");
   };
+  add_number_option(command, "--pedestrians", options_out->pedestrian_fraction,
+                    with_default("Share of pedestrians among the agents", options_out->pedestrian_fraction,
+                                 simulator.pedestrian_fraction),
+                    0, 1);
   add_number_option(
-      command, "--pedestrians", options_out->pedestrian_fraction,
-      with_default("Share of the agents", options_out->pedestrian_fraction, simulator.pedestrian_fraction), 0, 1);
-  add_number_option(command, "--cyclists", options_out->cyclist_fraction,
-                    with_default("Share of the agents", options_out->cyclist_fraction, simulator.cyclist_fraction), 0,
-                    1);
+      command, "--cyclists", options_out->cyclist_fraction,
+      with_default("Share of cyclists among the agents", options_out->cyclist_fraction, simulator.cyclist_fraction), 0,
+      1);
   add_number_option(command, "--parked", options_out->parked_cars,
-                    with_default("Parked cars", options_out->parked_cars, simulator.parked_cars), 0,
+                    with_default("Number of parked cars", options_out->parked_cars, simulator.parked_cars), 0,
                     kMaxAgentsPerWorld);
-  add_seed_option(command, &options_out->seed, "Seed of places, sizes, goals and actions");
+  add_seed_option(command, &options_out->seed, "Seed of the agents' positions, sizes, goals and random actions");
   add_threads_option(command, &options_out->num_threads);
   command->add_flag("!--no-walls", options_out->walls, "Leave out the walls along the building lines");
 }
@@ -39,8 +41,8 @@ void add_light_cycles_option(CLI::App* command, std::optional<LightCycles>* cycl
   command
       ->add_option_function<std::string>(
           "--light-cycles", [cycles_out](const std::string& name) { *cycles_out = light_cycles_named(name); },
-          fmt::format("How traffic lights cycle: phases (the lights of a junction take turns) or independent (each "
-                      "light alone); default: {}",
+          fmt::format("Cycles of traffic lights: phases (the lights of a junction take turns) or independent (each "
+                      "light has its own cycle); default: {}",
                       otherwise))
       ->check(one_of({std::begin(kLightCyclesNames), std::end(kLightCyclesNames)}));
 }
@@ -55,17 +57,17 @@ void add_light_heads_option(CLI::App* command, std::optional<LightHeads>* heads_
   command
       ->add_option_function<std::string>(
           "--light-heads", [heads_out](const std::string& name) { *heads_out = light_heads_named(name); },
-          fmt::format("Position of light heads: as_mapped, or visible: heads beside or before their stop line are "
-                      "moved {} m beyond it; default: {}, or, with a trained policy, as in training",
+          fmt::format("Position of light heads: as_mapped (as in the map), or visible (heads beside or before their "
+                      "stop line are moved {} m beyond it); default: {}, or, with a trained policy, as in training",
                       kVisibleHeadAhead_m, name_of(SimulatorConfig{}.light_heads)))
       ->check(one_of({kLightHeadsNames.begin(), kLightHeadsNames.end()}));
 }
 
 void add_scene_options(CLI::App* command, WorldOptions* options_out) {
-  add_number_option(command, "--start", options_out->start_step, "Start step in a recorded scene", 0,
+  add_number_option(command, "--start", options_out->start_step, "Step of a recorded scene at which episodes begin", 0,
                     kMaxScenarioSteps - 1);
   command->add_flag("--recorded-lights", options_out->recorded_lights,
-                    "Add the recorded lights to a recorded scene: drawn, observed and enforced");
+                    "Use the lights of a recorded scene: they are drawn, observed and enforced");
 }
 
 void reject_scene_options(const CLI::App& command, const std::string& map, std::initializer_list<const char*> more) {
@@ -89,18 +91,18 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
   add_light_heads_option(command, &world_out->light_heads);
   command
       ->add_option("--control", world_out->controlled,
-                   "Tracks of a recorded scene that --policy drives: self, vehicles (the others), others "
-                   "(non-vehicles), all, tracks_to_predict, objects_of_interest, and ids, separated by commas; tracks "
-                   "absent at the start follow the recording")
+                   "Tracks of a recorded scene that --policy drives, separated by commas: self (the self-driving car), "
+                   "vehicles (all other vehicles), others (non-vehicles), all, tracks_to_predict, objects_of_interest, "
+                   "and ids; tracks that are absent at the start follow the recording")
       ->capture_default_str();
   add_scene_options(command, world_out);
   add_number_option(command, "--steps", *steps_out, "Steps of 0.1 s; default for a recorded scene: its length", 1);
   command
-      ->add_option(
-          "--policy", *policy_out,
-          "random, idle, lane, idm_lanes (along lanes, behind others), in recorded scenes log (as recorded, the "
-          "default there), inverse (by the actions that follow the recording) or idm (along recorded paths, "
-          "behind others), or a checkpoint or safetensors written by train")
+      ->add_option("--policy", *policy_out,
+                   "Driver of the agents: random, idle, lane (follows lanes), idm_lanes (follows lanes and vehicles "
+                   "ahead), or a checkpoint or safetensors file written by train; in recorded scenes also log (repeats "
+                   "the recording, the default there), inverse (takes the actions that follow the recording most "
+                   "closely), idm (follows recorded paths and vehicles ahead)")
       ->capture_default_str();
   OtherShares& others = world_out->others;
   add_number_option(command, "--blind", others.blind,
@@ -110,7 +112,7 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
   add_number_option(command, "--inattentive", others.inattentive, "Share of the agents that see no traffic lights", 0,
                     1);
   add_decision_steps_option(command, &world_out->decision_steps);
-  add_policy_backend_options(command, "auto, and as in training", world_out);
+  add_policy_backend_options(command, "auto, but as in training for the renderer", world_out);
 }
 
 void resolve_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,

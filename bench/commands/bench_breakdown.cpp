@@ -286,7 +286,9 @@ void add_breakdown_benchmark(CLI::App& bench) {
   command->add_option("--backend", arguments->backends, "Renderers: cpu, cuda, gl:egl, gl:osmesa, null")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--samples", arguments->samples, "Samples per pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
+  command
+      ->add_option("--samples", arguments->samples,
+                   "Samples per pixel of the renderer gl: 1, N (MSAA) or NxN (supersampling)")
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--size", arguments->sizes, "Sizes in pixels, WxH; default: the paper's five")->delimiter(',');

@@ -224,7 +224,9 @@ void add_render_benchmark(CLI::App& bench) {
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--size", arguments->sizes, "Sizes in pixels, WxH; default: 96x54")->delimiter(',');
-  command->add_option("--samples", arguments->samples, "Samples per pixel, for gl: 1, N (MSAA) or NxN (supersampling)")
+  command
+      ->add_option("--samples", arguments->samples,
+                   "Samples per pixel of the renderer gl: 1, N (MSAA) or NxN (supersampling)")
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--format", arguments->format, "Type of a channel's value")

@@ -99,12 +99,12 @@ void add_scenes_benchmark(CLI::App& bench) {
   add_number_option(command, "--copies", arguments->copies, "Evaluations of each scene per measurement", 1, 100'000);
   command
       ->add_option("--rule", arguments->rules,
-                   "NAME=VALUE in place of a setting of the protocol; may be given several times")
+                   "NAME=VALUE, which replaces a setting of the protocol; may be given several times")
       ->allow_extra_args(false);
   add_number_option(command, "--at-once", options.scenes_at_once,
                     "Scenes simulated together; default: 256 on a device, 16 on the host", 1, 100'000);
   add_sampled_option(command, &options.argmax);
-  add_policy_backend_options(command, "auto, and as in training", &options);
+  add_policy_backend_options(command, "auto, but as in training for the renderer", &options);
   add_threads_option(command, &options.num_threads);
   add_number_option(command, "--repeats", arguments->repeats, "Measurements; the median is printed", 1, 1000);
   command->add_flag("--json", arguments->json, "Print one JSON object");
