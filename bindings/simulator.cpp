@@ -126,8 +126,7 @@ void define_construction(py::class_<PySimulator>* simulator) {
         return std::make_unique<PySimulator>(arguments.executor, arguments.config, arguments.maps,
                                              worlds_of(arguments.worlds), stream_of(arguments.stream));
       },
-      R"(Creates a simulator whose worlds are at the start of their first episodes. Defaults are those of the paper's training
-world.
+      R"(Creates a simulator with worlds at the start of their first episodes. Defaults are the paper's training world.
 
 Args:
     maps: Maps of the worlds.
@@ -140,7 +139,7 @@ Args:
     dt_s: Length of a step in seconds.
     episode_steps: Steps after which a world's episode ends.
     reset_inactive_fraction: A world's episode ends when this share of its agents is inactive; a value over 1 disables
-this.
+        this.
     pedestrian_fraction: Share of pedestrians among the agents.
     cyclist_fraction: Share of cyclists among the agents.
     parked_cars: Number of parked cars in each world.
@@ -148,7 +147,7 @@ this.
     walls: Whether buildings stand along the roads.
     wall_seed: Random seed of the heights of walls.
     light_heads: Positions of light heads. 'as_mapped': as in the map. 'visible': heads beside or before their stop line
-are moved 10 m beyond it, 3.5 m high.
+        are moved 10 m beyond it, 3.5 m high.
     wall_observations: Whether the entity set `walls` is observed.
     reset_at_standstill: Whether accelerations become 0 when the speed changes its sign.
     blind: Share of agents that see no other road users for some seconds. These and the next two kinds of impaired

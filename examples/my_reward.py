@@ -1,4 +1,4 @@
-"""Custom reward from the terms that the simulator returns: a Gymnasium wrapper that rewards progress and comfort."""
+"""Gymnasium wrapper with a custom reward for progress and comfort, computed from reward terms of the simulator."""
 
 import gymnasium
 import numpy as np
@@ -7,8 +7,7 @@ import pictura
 
 
 class ProgressReward(gymnasium.vector.VectorWrapper):
-    """Reward per metre driven, minus the re-weighted infraction terms of the library's reward and a penalty for harsh
-    driving."""
+    """Rewards each metre driven and each goal, and penalizes infractions and harsh driving, with new weights."""
 
     def __init__(self, env, per_m: float = 0.01, infraction: float = 2.0, comfort: float = 0.5) -> None:
         super().__init__(env)

@@ -1,5 +1,5 @@
-"""Custom cameras: a wide front camera and a narrow rear camera, of two sizes, and the visibility of the other agents in
-them."""
+"""Custom cameras: a wide front camera and a narrow rear camera, with different image sizes. Prints how visible the
+other agents are in their images."""
 
 import math
 

@@ -3,12 +3,13 @@
 Minutes on a CPU:    python examples/ppo.py
 A GPU, with images:  python examples/ppo.py --device cuda --observation images --num-envs 2720 --total-timesteps 50000000
 
-It prints the mean return of agents whose episode ended in the last ten updates, goals, waypoints and infractions
-for 1,000 agent-steps, and km per infraction. It writes progress.csv, config.toml and policy.pt into --out:
-`pictura plot runs/ppo_1 runs/ppo_2` draws their curves.
+It prints the mean return of agents whose episodes ended in the last ten updates, and goals, waypoints and infractions
+per 1,000 agent-steps. It writes progress.csv, config.toml and policy.pt into the folder --out. `pictura plot runs/ppo_1
+runs/ppo_2` draws curves of such folders.
 
-Observations, rewards and actions stay in the simulator's memory: the tensors here are views of it, and only a rollout's
-storage is copied. Steps of halted agents are stored, since arrays are rectangular, and masked out of every loss.
+Observations, rewards and actions stay in the simulator's memory. The tensors in this file are views of this memory;
+only the rollout's storage is a copy. Steps of halted agents are stored, because arrays are rectangular, but they are
+masked out of every loss.
 """
 
 import argparse
@@ -36,15 +37,15 @@ SETTINGS = {
 def parse_args() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--preset", choices=["demo", "town", "paper", "none"], default="demo")
-    parser.add_argument("--maps", nargs="+", help="in place of the preset's")
-    parser.add_argument("--num-envs", type=int, default=32, help="agents in all, in worlds of sizes that the preset draws")
-    parser.add_argument("--num-agents", type=int, help="of each world, with --num-worlds in place of --num-envs")
+    parser.add_argument("--maps", nargs="+", help="maps instead of the preset's maps")
+    parser.add_argument("--num-envs", type=int, default=32, help="total number of agents; the preset draws sizes of worlds")
+    parser.add_argument("--num-agents", type=int, help="agents in each world; then --num-worlds replaces --num-envs")
     parser.add_argument("--num-worlds", type=int, default=4)
     parser.add_argument("--observation", choices=["vector", "images"], default="vector")
     parser.add_argument("--image-size", type=int, nargs=2, default=[32, 18], metavar=("WIDTH", "HEIGHT"))
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--total-timesteps", type=int, default=120_000, help="of slots")
+    parser.add_argument("--total-timesteps", type=int, default=120_000, help="total number of steps of all slots")
     parser.add_argument("--learning-rate", type=float, default=1e-3)
     parser.add_argument("--num-steps", type=int, default=64)
     parser.add_argument("--gamma", type=float, default=0.98)
@@ -55,8 +56,8 @@ def parse_args() -> argparse.Namespace:
     parser.add_argument("--ent-coef", type=float, default=0.002)
     parser.add_argument("--vf-coef", type=float, default=0.5)
     parser.add_argument("--max-grad-norm", type=float, default=0.5)
-    parser.add_argument("--out", default="runs/ppo", help="folder of what it writes; '' for none")
-    parser.add_argument("--json", action="store_true", help="prints the last update as JSON, and nothing else")
+    parser.add_argument("--out", default="runs/ppo", help="folder for the files that it writes; '' for none")
+    parser.add_argument("--json", action="store_true", help="print only the last update, as JSON")
     return parser.parse_args()
 
 
@@ -74,7 +75,7 @@ def make_envs(args: argparse.Namespace) -> gymnasium.vector.VectorEnv:
 
 
 def measured(before: dict, now: dict, recent: collections.deque) -> dict[str, float]:
-    """What agents did between two totals of a simulator, by the names of `pictura train`."""
+    """Returns statistics of the steps between two totals of a simulator, with the names that `pictura train` uses."""
     since = {name: now[name] - before[name] for name in now if name != "reward_terms"}
     recent.append((since["finished_return"], since["finished_agent_episodes"]))
     returns, finished = map(sum, zip(*recent))
@@ -86,7 +87,7 @@ def measured(before: dict, now: dict, recent: collections.deque) -> dict[str, fl
 
 
 def write_config(folder: pathlib.Path, args: argparse.Namespace) -> None:
-    """The arguments as TOML, by which `pictura plot` finds runs that differ in their seed alone."""
+    """Writes the arguments as TOML. `pictura plot` reads them to find runs that differ only in their seeds."""
     settings = {name: value for name, value in vars(args).items() if name not in ("seed", "out", "json") and value is not None}
     lines = [f"{name} = {json.dumps(value)}" for name, value in settings.items()]
     (folder / "config.toml").write_text("\n".join([f"[run]\nseed = {args.seed}\n\n[ppo]", *lines]) + "\n")
@@ -129,8 +130,8 @@ def main() -> None:
             with torch.no_grad():
                 logits, values[step] = agent(seen)
             logprob = logits.log_softmax(1)
-            # Draws from the softmax (Gumbel's method) without making the host wait for the device, as
-            # torch.distributions does.
+            # Samples from the softmax with the Gumbel-max trick. Unlike torch.distributions, this does not make the
+            # host wait for the device.
             action = (logprob - torch.empty_like(logprob).exponential_().log()).argmax(1)
             actions[step], logprobs[step] = action, logprob.gather(1, action[:, None]).squeeze(1)
             seen, rewards[step], terminations[step], truncated, info = envs.step(action)
@@ -141,15 +142,16 @@ def main() -> None:
             next_value = agent(seen)[1]
             advantages, last = torch.zeros_like(rewards), torch.zeros(n, device=device)
             for t in reversed(range(args.num_steps)):
-                # After a truncation, too, the next observation is the episode's last; its value bootstraps the return.
+                # Also after a truncation, the next observation is the last of its episode, so its value bootstraps the
+                # return.
                 following = next_value if t == args.num_steps - 1 else values[t + 1]
                 delta = rewards[t] + args.gamma * following * ~terminations[t] - values[t]
                 advantages[t] = last = delta + args.gamma * args.gae_lambda * last * ~dones[t]
             returns = advantages + values
 
         rows = valids.flatten().nonzero().squeeze(1)
-        # Minibatches have few sizes, so that memory and kernels chosen for one size are reused; the remaining shuffled
-        # rows of an epoch are dropped.
+        # Minibatches have few distinct sizes, so that memory and kernels for a size are reused. The remaining rows of a
+        # shuffled epoch are dropped.
         coarse = max(1, args.num_steps * n // (16 * args.num_minibatches))
         size = max(coarse, len(rows) // args.num_minibatches // coarse * coarse)
         agent_steps += len(rows)

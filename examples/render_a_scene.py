@@ -1,5 +1,5 @@
-"""Draws a street with three road users, defined by arrays, into render_a_scene.png: the images of the paper's
-cameras."""
+"""Draws a street with three road users, which arrays define, and writes images of the paper's cameras to
+render_a_scene.png."""
 
 import sys
 

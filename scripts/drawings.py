@@ -1,7 +1,7 @@
-"""Draws network.png, the network's layers, summation_order.png, sums of the same numbers in other orders,
-training_update.png, the parts of an update, and realism_likelihood.png, the likelihood of a recorded value.
+"""Draws pictures for documents: network.png (layers of the network), summation_order.png (sums of the same numbers in
+different orders), training_update.png (parts of an update), realism_likelihood.png (likelihood of a recorded value).
 
-    python3 scripts/drawings.py FOLDER    FOLDER: where to write, docs/images in scripts/figures
+    python3 scripts/drawings.py FOLDER    writes into FOLDER; scripts/figures passes docs/images
 """
 
 import pathlib
@@ -31,7 +31,7 @@ def save(figure, path):
 
 
 def draw_network(path):
-    """Boxes of layers with their widths, for both modalities."""
+    """Draws the layers and their widths as boxes, for both modalities."""
     figure, axes = plt.subplots(figsize=(9.2, 3.6))
     axes.set(xlim=(0, 92), ylim=(0, 36))
     axes.axis("off")
@@ -68,7 +68,7 @@ def draw_network(path):
 
 
 def draw_sums(path):
-    """How far single-precision and fixed-point sums of 64 weights, in 2,000 random orders, are from the exact sum."""
+    """Draws the errors of single-precision and fixed-point sums of 64 weights, for 2,000 random orders."""
     random = np.random.default_rng(1)
     weights = random.random(64).astype(np.float32) / 64
     orders = [random.permutation(64) for _ in range(2000)]
@@ -90,7 +90,7 @@ def draw_sums(path):
 
 
 def draw_likelihood(path):
-    """Histogram of a feature over rollouts, and the recorded value whose bin gives the likelihood."""
+    """Draws a histogram of a feature over rollouts, and the recorded value, whose bin gives the likelihood."""
     speeds = np.random.default_rng(2).normal(11, 2.5, 32 * 80).clip(0, 25)
     counts, edges = np.histogram(speeds, bins=10, range=(0, 25))
     likelihood = (counts + 0.1) / (len(speeds) + 0.1 * 10)
@@ -106,7 +106,7 @@ def draw_likelihood(path):
 
 
 def draw_update(path):
-    """Parts of one update of training, in order, and the way back."""
+    """Draws the parts of one training update in order, and the arrow back to the first part."""
     figure, axes = plt.subplots(figsize=(11, 2.6), dpi=100)
     for i, ((title, text), color) in enumerate(zip(UPDATE, COLORS, strict=True)):
         x = i * (WIDTH + GAP)

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Runs the commands of scripts/gpu_check and keeps their results in one JSON file, which is rewritten after each.
 
-gpu_check_record.py FILE start [--keep]                begins FILE: source hash, GPU, driver; --keep: continues if these
-                                                       are the same, and stays complete
-gpu_check_record.py FILE run NAME [--limit S] -- COMMAND...    seconds, and its summary or last lines
-gpu_check_record.py FILE bench NAME [--limit S] -- COMMAND...  the JSON object that it prints, even if it fails
-gpu_check_record.py FILE tests -- ctest...             counts, failed, skipped and slowest tests
+gpu_check_record.py FILE start [--keep]                begins FILE with the source hash, GPU and driver; --keep: if
+these
+                                                       are unchanged, keeps FILE's results and its mark as complete
+gpu_check_record.py FILE run NAME [--limit S] -- COMMAND...    keeps the command's duration, and its summary or last
+lines gpu_check_record.py FILE bench NAME [--limit S] -- COMMAND...  keeps the JSON object that the command prints
+gpu_check_record.py FILE tests -- ctest...             keeps counts, and failed, skipped and slowest tests
 gpu_check_record.py FILE finish                        marks FILE as complete
 
 Exit status: 0 if the command succeeded, else 1.
@@ -34,7 +35,7 @@ SUMMARY = re.compile(r"\[  PASSED  \]|=========.* SUMMARY: ")
 
 
 def source_hash():
-    """Hash over each file's path, length and bytes, except documents."""
+    """Returns a hash of the paths, lengths and bytes of all files except documents."""
     files = {path for folder in SOURCES for path in pathlib.Path(folder).rglob("*") if path.is_file()}
     digest = hashlib.sha256()
     for path in sorted(files | {pathlib.Path("CMakeLists.txt")}):
@@ -102,7 +103,7 @@ def started(command, stderr):
 
 
 class Run:
-    """Finished command: its outcome as text, empty for success; seconds; its output."""
+    """Finished command: its outcome (a text, empty for success), its duration in seconds, and its output."""
 
     def __init__(self, command, limit_s, keeps_stdout):
         begin = time.monotonic()
@@ -168,7 +169,7 @@ def run_bench(file, name, command, limit_s):
         run.outcome = f"expected a JSON object, got '{run.stdout[:80]}'"
     say(name, run)
     if run.outcome:
-        # A bench may fail because of its results, as a soak does.
+        # A bench can print results and fail because of them. An example is the soak.
         add(file, "failed", run.failure(name) | ({} if measured is None else {"measured": measured}))
     else:
         add(file, "bench", run.entry(name) | measured)
@@ -176,15 +177,15 @@ def run_bench(file, name, command, limit_s):
 
 
 class Tests:
-    """Results parsed from ctest's lines so far."""
+    """Results in the lines of ctest that were parsed so far."""
 
     def __init__(self):
         self.passed = self.total = 0
         self.failed, self.skipped, self.times = [], [], []
-        self.output_of = None  # failed test whose output follows
+        self.output_of = None  # the failed test whose output the next lines contain
 
     def take(self, line):
-        """Whether the line is a test's result."""
+        """Parses a line. Returns whether it is the result of a test."""
         match = TEST.match(line)
         if not match:
             if NEXT_TEST.match(line):
@@ -231,7 +232,7 @@ def run_tests(file, command):
 
 
 def end_with_command(*_):
-    """Signal handler: exits, which kills the command too."""
+    """Signal handler, which exits. The exit also kills the command."""
     sys.exit(1)
 
 

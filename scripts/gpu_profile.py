@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Prints Nsight Compute's metrics of kernel launches of a command, as one JSON object.
+"""Prints metrics of Nsight Compute for the kernel launches of a command, as one JSON object.
 
 gpu_profile.py [--skip N] [--launches N] -- COMMAND...   runs COMMAND under ncu
 gpu_profile.py --csv FILE                                reads ncu's output: --csv --page details
 
-Only kernels whose names begin with pictura_ count; N launches are profiled after the skipped ones. Profiled kernels run
-one after the other at ncu's clock, so compare durations with each other, not with a bench's.
+Only kernels whose names begin with pictura_ count. After --skip launches, --launches launches are profiled. Profiled
+kernels run one after the other at ncu's clock rate, so do not compare their durations with those of a bench.
 Exit status: 0, or 1 with the reason if ncu is missing, fails or prints no metrics.
 """
 import argparse

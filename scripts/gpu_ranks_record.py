@@ -1,4 +1,4 @@
-"""Steps of scripts/gpu_ranks after the command is built; see its --help.
+"""Executes the steps of scripts/gpu_ranks after the command is built. `scripts/gpu_ranks --help` describes the steps.
 
 Usage: gpu_ranks_record.py --pictura FILE --results FILE [OPTIONS] -- [ARGUMENTS of pictura train...]
 """
@@ -21,10 +21,10 @@ import time
 SMALL = ["--set", "simulator.num_slots=2048", "--set", "train.num_steps=32", "--set", "train.minibatch_size=16384",
          "--set", "train.schedule=constant"]  # fmt: skip
 STEPS = ["equal", "updates", "killed", "rate"]
-MINIBATCH_OF_AN_AGENT = 0.8  # transitions: 16,384 with 20,480 agents
+MINIBATCH_OF_AN_AGENT = 0.8  # transitions per agent: minibatches of 16,384 with 20,480 agents
 WARM_UP_UPDATES = 3  # the first updates compile kernels and select algorithms
 CHUNK = 4096
-GRADIENT_TOLERANCE = 1e-4  # share of each parameter's largest gradient; or twice the effect of another chunk size on one GPU
+GRADIENT_TOLERANCE = 1e-4  # share of each parameter's largest gradient
 END_S = 60  # time limit for ranks to end after one was killed
 
 
@@ -46,7 +46,7 @@ class Ranks:
         ]  # fmt: skip
 
     def progress(self):
-        """Complete rows of the run's curve so far."""
+        """Returns the complete rows of the run's progress.csv so far."""
         file = self.out / "progress.csv"
         if not file.exists():
             return []
@@ -63,7 +63,7 @@ class Ranks:
 
 
 def checkpoint_parts(path):
-    """Returns the first moments of a checkpoint by parameter, and the bytes of its simulator."""
+    """Returns a checkpoint's first moments by parameter, and the bytes of its simulator state."""
     content = pathlib.Path(path).read_bytes()
     header_size = struct.unpack_from("<Q", content, 16)[0]
     header, data = json.loads(content[24 : 24 + header_size]), content[24 + header_size :]
@@ -76,7 +76,8 @@ def checkpoint_parts(path):
 
 
 def largest_relative_difference(one, other):
-    """Returns the largest difference over parameters relative to each parameter's largest value, and the parameter."""
+    """Returns the largest difference between two checkpoints, relative to each parameter's largest value, and the name
+    of that parameter."""
     differences = {
         name: max(abs(a - b) for a, b in zip(values, other[name])) / max(1e-30, *map(abs, values))
         for name, values in one.items()
@@ -90,7 +91,7 @@ def told(report, *more):
 
 
 class Steps:
-    """Each method runs a step and returns its record, and whether it succeeded."""
+    """Steps of the script. Each method executes a step, and returns its record and whether it succeeded."""
 
     def __init__(self, options, folder):
         self.options, self.folder, self.ranks = options, folder, max(options.ranks)
@@ -102,7 +103,7 @@ class Steps:
         return Ranks(self.options.pictura, size, self.folder / name, *arguments)
 
     def equal(self):
-        # After one optimizer step the first moments are a multiple of the clipped gradient.
+        # After one optimizer step, first moments are a constant multiple of the clipped gradients.
         more = [*SMALL, "--set", "train.updates=1", "--set", "train.reproducible=true", "--set", "train.precision=fp32",
                 "--set", "train.update_epochs=1", "--set", "train.minibatch_size=65536"]  # fmt: skip
         cases = {"one": (1, CHUNK), "many": (self.ranks, CHUNK), "half": (1, CHUNK // 2)}
@@ -192,8 +193,8 @@ class Steps:
 
     @staticmethod
     def rates(rows):
-        """Returns statistics of whole updates after the warm-up: agent-steps/s, the share that the filter keeps,
-        seconds by phase."""
+        """Returns statistics of whole updates after the warm-up: agent-steps/s, the share of transitions that the
+        advantage filter keeps, and seconds by phase."""
 
         def summary(values):
             return {"median": statistics.median(values), "min": min(values), "max": max(values)}

@@ -19,11 +19,11 @@ class UsageError(Error, ValueError):
 class Array:
     """
     Array in the library's memory, lent without a copy.
-
+    
     On the CPU, `numpy.asarray(array)` returns a NumPy view. On any device, DLPack gives access: `torch.from_dlpack`,
     `numpy.from_dlpack`, JAX and CuPy. The memory remains allocated while any reference to it exists, even after its
     simulator or renderer is deleted. Later calls of the simulator or renderer change the contents.
-
+    
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
         >>> ego = simulator.observations['ego']
@@ -88,7 +88,7 @@ class Array:
 class Geometry:
     """
     Geometry of a map for renderers: strips on the road, walls, light heads.
-
+    
     Examples:
         >>> pictura.Map.load('procedural:3').geometry(walls=False).num_walls
         0
@@ -99,7 +99,7 @@ class Geometry:
     def __init__(self, lines: collections.abc.Sequence[tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.float32], typing.SupportsFloat | typing.SupportsIndex, typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"]]] = [], walls: typing.Annotated[numpy.typing.ArrayLike, numpy.float32] = ...) -> None:
         """
         Creates a custom geometry.
-
+        
         lines: list of (points [n, 3] in metres, width in metres, RGB colour with values in [0, 1]).
         walls: float [n, 7]: both ends of a wall on the ground (x, y, z, x, y, z) and its height, in metres.
         Raises pictura.Error for other shapes. Renderers reject numbers that are not finite.
@@ -124,9 +124,9 @@ class Geometry:
 class Map:
     """
     Road network: lanes, markings, edges and traffic lights. A map is immutable, so simulators and renderers can share it.
-
+    
     Positions are in metres in the map's frame, with z up. `origin_m` is the origin of this frame in the file's coordinates.
-
+    
     Examples:
         >>> town = pictura.Map.load('procedural:3')                # or 'Town01', 'city:1', 'mytown.xodr'
         >>> town.name, town.draw(320, 200).shape
@@ -144,7 +144,7 @@ class Map:
         """
         Loads or generates a map by name: an OpenDRIVE file (.xodr), a Lanelet2 file (.osm), a town in the folder map_folder(),
         'procedural:SEED', or 'city:SEED'. For FILE.osm@LATITUDE,LONGITUDE this place is the origin of coordinates.
-
+        
         Faults of a file that have only one sensible repair are repaired, and listed in `mends`.
         strict: rejects files with such faults instead.
         chord_error_m: maximum distance in metres between a curve and the polyline that approximates it.
@@ -158,7 +158,7 @@ class Map:
     def arrays(self) -> dict:
         """
         Returns copies of the network's geometry as NumPy arrays by name. Lengths are in metres.
-
+        
         lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length. lane_point_range int32 [lanes, 2]: the
         half-open range of each lane's points. lane_type uint8 [lanes]: indices into pictura.LANE_TYPES. lane_links int32:
         successors and predecessors of all lanes. road_edges, stop_lines, building_lines float32 [n, 6]: both ends of each
@@ -201,11 +201,11 @@ class Map:
 class Scenario(Map):
     """
     Recorded scene: a map, the tracks of all road users, and the recorded traffic lights. A scenario is immutable.
-
+    
     A simulator uses a scenario as the map of a world. The agents of this world are the tracks, in the same order, from
     `start_step` on: pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world()). The controller 'log' and commands
     of kind 3 replay the tracks.
-
+    
     Examples:
         >>> scene = pictura.Scenario.load('drive.scenario')            # or FILE.tfrecord#7, FILE.json, a folder
         >>> simulator = pictura.Simulator([scene], [(0, scene.num_tracks)], **scene.world())
@@ -217,11 +217,11 @@ class Scenario(Map):
     def from_arrays(tracks: dict, lanes: dict, *, lines: dict | None = None, edges: dict | None = None, crosswalks: dict | None = None, stop_signs: dict | None = None, lights: dict | None = None, dt_s: typing.SupportsFloat | typing.SupportsIndex = 0.1, current_step: typing.SupportsInt | typing.SupportsIndex | None = None, sdc_track: typing.SupportsInt | typing.SupportsIndex | None = None, id: str = '', origin_m: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(3)"] | None = None, tolerance_m: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> Scenario:
         """
         Creates a scene from dicts of NumPy arrays, or of objects that NumPy converts to arrays.
-
+        
         Lengths are in metres. Positions are float64 in any frame. Polylines are given by two arrays: points float64 [P, 3], the
         points of all polylines one after the other, and begin int32 [N + 1], the index of each polyline's first point, followed
         by P. Lists of ids are given in the same way, for example by lanes and lanes_begin.
-
+        
         Args:
             tracks: id int64 [T]; type [T], indices into pictura.TRACK_TYPES; size_m [T, 3], length, width and height; valid
                 bool [T, S]; position_m [T, S, 3], centre of the box's foot; heading_rad [T, S]; velocity_mps [T, S, 2]. States
@@ -243,7 +243,7 @@ class Scenario(Map):
             id: Id of the scene.
             origin_m: Origin of the map's frame, in which positions are rounded to float32. None: the middle of lanes and edges.
             tolerance_m: Maximum deviation of polylines when points are removed. 0 keeps all points.
-
+        
         Raises:
             pictura.UsageError: An array is invalid; the message names the array and the element.
             pictura.Error: The arrays do not form a scene.
@@ -253,7 +253,7 @@ class Scenario(Map):
         """
         Loads a scene by name: FILE.json, FILE.bin, FILE.scenario, a file with '.tfrecord' in its name, or a folder of such
         files. A suffix '#7' or '#SCENARIO_ID' selects one of several scenes.
-
+        
         start_step: step of the recording at which episodes begin.
         Raises pictura.Error, which names file, record and field, and pictura.UsageError if the scene or step does not exist.
         """
@@ -264,14 +264,14 @@ class Scenario(Map):
     def draw(self, width_px: typing.SupportsInt | typing.SupportsIndex = 1024, height_px: typing.SupportsInt | typing.SupportsIndex = 1024) -> numpy.typing.NDArray[numpy.uint8]:
         """
         Draws the scene from above, uint8 [height, width, 3], north up: the paths of all tracks, and the road users at start_step.
-
+        
         Sizes from 16 to 8192 px.
         """
     def inverse_actions(self, num_threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
         """
         Computes the actions with which the simulator's dynamics follow the recording most closely. Returns NumPy arrays by
         name.
-
+        
         The arrays are [tracks, steps from start_step on], with a value for the step after each state. actions int32: the
         action. is_followed bool: whether the states before and after the step are recorded. error_m float32: distance between
         the simulated and the recorded position after the step.
@@ -280,7 +280,7 @@ class Scenario(Map):
     def mask(self, words: str, *, absent: bool = False) -> numpy.typing.NDArray[numpy.uint8]:
         """
         Returns a mask uint8 [tracks], which is 1 for selected tracks.
-
+        
         words: comma-separated list of self (the self-driving car), vehicles (all other vehicles), others (all non-vehicles),
         all, tracks_to_predict, objects_of_interest, and ids of tracks.
         absent: also selects tracks that are absent at start_step.
@@ -289,26 +289,26 @@ class Scenario(Map):
     def save(self, path: str) -> None:
         """
         Writes the scene to a file *.scenario, completely or not at all. load() restores exactly the same scene.
-
+        
         Raises pictura.UsageError for another file extension, and pictura.Error if the file cannot be written.
         """
     def starting_at(self, start_step: typing.SupportsInt | typing.SupportsIndex) -> Scenario:
         """
         Returns the same scene with another start step, without copying data.
-
+        
         Raises pictura.UsageError if the scene does not have this step.
         """
     def to_arrays(self) -> dict:
         """
         Returns a dict of arguments with which pictura.Scenario.from_arrays(**arrays) creates the same scene.
-
+        
         The result does not contain tracks to predict, tracks marked for replay, walls, parking spaces, signs other than stop
         signs, widths of paint, and the data for bit-exact replay of a saved run.
         """
     def tracks(self) -> dict:
         """
         Returns copies of the tracks as NumPy arrays by name.
-
+        
         id int64 [tracks]: ids in the file. type uint8 [tracks]: indices into pictura.TRACK_TYPES. size_m float32 [tracks, 3]:
         length, width, height. valid bool [tracks, steps]: whether the state is recorded. position_m float32 [tracks, steps, 3]:
         centre of the box's foot in the map's frame. heading_rad [tracks, steps]. velocity_mps [tracks, steps, 2]: 0 if
@@ -322,7 +322,7 @@ class Scenario(Map):
         """
         Returns the options for pictura.Simulator([scene], worlds, **options): the recording's time step, episodes from
         start_step to the end of the recording, no walls, no parked cars, no early end of episodes, and unscaled dynamics.
-
+        
         Other options in kwargs are kept, for example those of a pictura.PolicySession: scene.world(**session.training_world()).
         """
     @property
@@ -379,7 +379,7 @@ class SceneRecorder:
     """
     Records the current episode of one world as a scene. The simulator must be on the CPU. While the recorder exists, it
     records every step of the simulator, by any function.
-
+    
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
         >>> recorder = pictura.SceneRecorder(simulator)
@@ -398,7 +398,7 @@ class SceneRecorder:
         """
         Returns the pictura.Scenario recorded so far. Its tracks are the controlled agents and the parked cars of the world; a
         track's id is the index of its box in the world. The world's lights are its recorded lights.
-
+        
         self_agent: agent whose track is marked as the self-driving car; -1: none. Raises pictura.UsageError for an agent that
         was never present.
         """
@@ -411,7 +411,7 @@ class Camera:
     """
     Pinhole camera on a body. Its position is in metres from the rig's origin: x forward, y left, z up. Angles are in
     radians. Positive yaw is counter-clockwise, positive pitch looks up, and positive roll is clockwise as seen from behind.
-
+    
     Examples:
         >>> roof = pictura.Camera('roof', 128, 72, position_m=(1.0, 0.0, 1.6), pitch_rad=-0.1)
         >>> roof.focal_x_px
@@ -493,7 +493,7 @@ class Camera:
 class Rig:
     """
     One or more cameras on a body, in the order of their images. Cameras may have different image sizes.
-
+    
     Examples:
         >>> [camera.name for camera in pictura.Rig.paper(96, 54).cameras]
         ['front', 'front_left', 'front_right', 'back']
@@ -529,7 +529,7 @@ class Scene:
     """
     Dynamic objects of one or more worlds: boxes of agents and states of traffic lights. Simulator.scene always shows the
     simulator's current state. A scene created from arrays has a copy of them.
-
+    
     Examples:
         >>> car = pictura.Scene(center_m=[[12, 0, 0]], heading_rad=[0], size_m=[[4.4, 1.8, 1.5]], agent_class=[0])
         >>> car.num_worlds, car.boxes.shape
@@ -538,7 +538,7 @@ class Scene:
     def __init__(self, center_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], heading_rad: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], size_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], agent_class: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], *, world_begin: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, geometry: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, light_states: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, light_begin: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None) -> None:
         """
         Creates a scene from arrays.
-
+        
         Args:
             center_m: [n, 3], centres of the boxes' feet, in metres.
             heading_rad: [n], headings in radians.
@@ -548,7 +548,7 @@ class Scene:
             geometry: [worlds], handle of each world's geometry, as in Renderer.upload(); default: 0.
             light_states: States of the lights of all worlds: 0 off, 1 red, 2 yellow, 3 green, 4 unknown.
             light_begin: [worlds + 1], index of the first light of each world, followed by the number of lights.
-
+        
         Raises:
             pictura.Error: An array has another shape. Inconsistent arrays raise the error later, in render().
         """
@@ -567,7 +567,7 @@ class Scene:
 class SceneFile:
     """
     Scene in a TOML file: geometry, boxes, rig and views.
-
+    
     Examples:
         >>> text = '''size_px = [96, 54]
         ... [[view]]
@@ -611,7 +611,7 @@ class Images:
     """
     Images of several views by all cameras of a rig, in the renderer's memory. They may have planes: depth, class and
     instance of each pixel. A renderer can draw into the same images repeatedly.
-
+    
     Examples:
         >>> renderer = pictura.Renderer('cpu', pictura.Rig.paper(32, 18))
         >>> images = renderer.make_images(num_views=5)
@@ -652,7 +652,7 @@ class Renderer:
     """
     Renderer of scenes. Only one thread at a time may use a renderer; different renderers are independent. On CUDA, work is
     enqueued on `stream`.
-
+    
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
         >>> renderer = pictura.Renderer('cpu', pictura.Rig.paper(32, 18))
@@ -668,7 +668,7 @@ class Renderer:
     def __init__(self, name: str = 'auto', rig: Rig | None = None, *, device: str = 'cpu', num_threads: typing.SupportsInt | typing.SupportsIndex = 0, line_floor_px: typing.SupportsFloat | typing.SupportsIndex = 0.3499999940395355, debug_palette: bool = False, samples: str = '1', camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, stream: typing.Any = None) -> None:
         """
         Creates a renderer.
-
+        
         Args:
             name: 'cpu', 'cuda', 'gl' ('gl:egl', 'gl:osmesa'), 'null', or 'auto'.
             rig: Cameras; default: the paper's rig.
@@ -680,7 +680,7 @@ class Renderer:
             camera_severity: Severity of randomized cameras, 0 to 2, as in evaluations (docs/explanation/cameras.md). The field
                 `key` of a view, which a simulator sets, keys the random numbers.
             stream: A cudaStream_t as int; None: the legacy default stream.
-
+        
         Raises:
             pictura.UsageError: The name is unknown; the message lists the valid names.
             pictura.Error: The renderer cannot run on this machine.
@@ -700,7 +700,7 @@ class Renderer:
     def render(self, scene: Scene, views: typing.Any, out: typing.Any = None, *, dtype: str = 'uint8', planes: bool = False) -> typing.Any:
         """
         Draws the images of every camera for every view. Returns `out`.
-
+        
         views: VIEW_DTYPE [n], or Simulator.views.
         out: Images, or an array [n, cameras, 3, height, width] in the renderer's memory (NumPy, torch, ...) if all cameras have
         the same image size. Its type is uint8, float32, float16 or bfloat16, with values from 0 to 255. Default: new Images
@@ -715,7 +715,7 @@ class Renderer:
     def visibility(self, scene: Scene, views: typing.Any, queries: typing.Annotated[numpy.typing.ArrayLike, numpy.int32]) -> numpy.typing.NDArray[numpy.float32]:
         """
         Returns the visibility of agents, float32 [n].
-
+        
         queries: int [n, 2], pairs of (index of the view, index of the box in the scene).
         A visibility is the area that the box covers in the view's images, divided by the area that it covers if it is drawn
         alone. It is NaN if the box is outside the images of all cameras.
@@ -745,7 +745,7 @@ class Renderer:
 class StepResult:
     """
     Results of a step, one element per slot, in the simulator's memory; every step overwrites the same arrays.
-
+    
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
         >>> result = simulator.step(np.full(4, pictura.IDLE_ACTION, np.int32))
@@ -792,7 +792,7 @@ class StepResult:
 class Snapshot:
     """
     Copy of a simulator's state in the simulator's memory, from Simulator.snapshot().
-
+    
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 4)])
         >>> before, snapshot = simulator.state_hash(), simulator.snapshot()
@@ -812,11 +812,11 @@ class _ControllerInside:
 class Controller:
     """
     Controller of the agents in one simulator on the CPU.
-
+    
     Controllers by name are 'lane' (follows lanes), 'idm_lanes' (follows lanes and keeps a distance to vehicles ahead),
     'idle' and 'random', and in recorded scenes 'log', 'inverse' and 'idm'. pictura.PolicySession makes controllers with a
     policy; shared() combines several controllers.
-
+    
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
         >>> simulator.run(pictura.Controller('lane', simulator), steps=50)
@@ -831,7 +831,7 @@ class Controller:
     def shared(drivers: collections.abc.Sequence[tuple[Controller, typing.Any]], simulator: Simulator) -> Controller:
         """
         Returns a controller that combines several controllers, each for some of a simulator's slots.
-
+        
         drivers: pairs (controller, mask). If two controllers command the same slot, the later one in the list drives.
         mask: uint8 or bool [slots] in the simulator's memory, which every step reads; None: all slots.
         Raises pictura.Error for a mask of another shape, type or device, and for a controller of another simulator.
@@ -855,11 +855,11 @@ class Simulator:
     Many worlds, each on one map, which advance together. Arrays have one element for each slot: first for the controlled
     agents of world 0, then for the controlled agents of world 1, and so on. Results of the executors 'cpu' and 'cuda' are
     equal bit for bit.
-
+    
     Only one thread at a time may use a simulator; different simulators are independent. The GIL is released while C++ code
     runs. On CUDA, work is enqueued on `stream`, and calls return before the work is done. Invalid values then raise an
     error in check() or a later call.
-
+    
     Examples:
         >>> town = pictura.Map.load('procedural:3')
         >>> simulator = pictura.Simulator([town], [(0, 16)] * 4, seed=1)          # four worlds of sixteen agents
@@ -869,13 +869,12 @@ class Simulator:
     """
     def __init__(self, maps: collections.abc.Sequence[Map], worlds: collections.abc.Sequence, *, executor: str = 'auto', device: str = 'cpu', seed: typing.SupportsInt | typing.SupportsIndex = 0, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, dt_s: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, episode_steps: typing.SupportsInt | typing.SupportsIndex = 1280, reset_inactive_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.4000000059604645, pedestrian_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, cyclist_fraction: typing.SupportsFloat | typing.SupportsIndex = 0.10000000149011612, parked_cars: typing.SupportsInt | typing.SupportsIndex = 32, light_cycles: str = 'phases', walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0, light_heads: str = 'as_mapped', wall_observations: bool = False, reset_at_standstill: bool = False, blind: typing.SupportsFloat | typing.SupportsIndex = 0.0, phantom_braking: typing.SupportsFloat | typing.SupportsIndex = 0.0, inattentive: typing.SupportsFloat | typing.SupportsIndex = 0.0, stagger_episodes: bool = False, fixed_lights: bool = False, auxiliary_observations: bool = True, vector_observations: bool = True, conditioning: dict = {}, stream: typing.Any = None) -> None:
         """
-        Creates a simulator whose worlds are at the start of their first episodes. Defaults are those of the paper's training
-        world.
-
+        Creates a simulator with worlds at the start of their first episodes. Defaults are the paper's training world.
+        
         Args:
             maps: Maps of the worlds.
-                worlds: A tuple (index of the map, number of agents) or (index, number, global world) for each world. The global
-                    world, an int, keys the world's random numbers.
+            worlds: A tuple (index of the map, number of agents) or (index, number, global world) for each world. The global
+                world, an int, keys the world's random numbers.
             executor: 'cpu', 'cuda' or 'auto'.
             device: Memory of observations and scenes: 'cpu', 'cuda' or 'cuda:INDEX'.
             seed: Seed of all random numbers.
@@ -883,7 +882,7 @@ class Simulator:
             dt_s: Length of a step in seconds.
             episode_steps: Steps after which a world's episode ends.
             reset_inactive_fraction: A world's episode ends when this share of its agents is inactive; a value over 1 disables
-            this.
+                this.
             pedestrian_fraction: Share of pedestrians among the agents.
             cyclist_fraction: Share of cyclists among the agents.
             parked_cars: Number of parked cars in each world.
@@ -891,24 +890,24 @@ class Simulator:
             walls: Whether buildings stand along the roads.
             wall_seed: Random seed of the heights of walls.
             light_heads: Positions of light heads. 'as_mapped': as in the map. 'visible': heads beside or before their stop line
-            are moved 10 m beyond it, 3.5 m high.
-                wall_observations: Whether the entity set `walls` is observed.
-                reset_at_standstill: Whether accelerations become 0 when the speed changes its sign.
-                blind: Share of agents that see no other road users for some seconds. These and the next two kinds of impaired
-                    agents are drawn at random in each episode; their transitions are never valid.
-                phantom_braking: Share of agents that brake hard for some seconds without a reason.
-                inattentive: Share of agents that see no traffic lights.
-                stagger_episodes: Whether the first episode of each world ends after a random number of steps.
-                fixed_lights: Whether lights are green, yellow and red for 10, 3 and 2 s, as in evaluations. Otherwise durations are
-                    random in each episode.
-                auxiliary_observations: Whether auxiliary numbers, which no image shows, are observed.
-                vector_observations: Whether the entity sets are observed.
-                conditioning: A number or a range (low, high) for names in CONDITIONING_NAMES; other names have the paper's ranges.
+                are moved 10 m beyond it, 3.5 m high.
+            wall_observations: Whether the entity set `walls` is observed.
+            reset_at_standstill: Whether accelerations become 0 when the speed changes its sign.
+            blind: Share of agents that see no other road users for some seconds. These and the next two kinds of impaired
+                agents are drawn at random in each episode; their transitions are never valid.
+            phantom_braking: Share of agents that brake hard for some seconds without a reason.
+            inattentive: Share of agents that see no traffic lights.
+            stagger_episodes: Whether the first episode of each world ends after a random number of steps.
+            fixed_lights: Whether lights are green, yellow and red for 10, 3 and 2 s, as in evaluations. Otherwise durations are
+                random in each episode.
+            auxiliary_observations: Whether auxiliary numbers, which no image shows, are observed.
+            vector_observations: Whether the entity sets are observed.
+            conditioning: A number or a range (low, high) for names in CONDITIONING_NAMES; other names have the paper's ranges.
             stream: A cudaStream_t as int; None: the legacy default stream.
-
+        
         Raises:
             pictura.UsageError: An argument is invalid; the message names it.
-                pictura.Error: The device does not exist.
+            pictura.Error: The device does not exist.
         """
     def __reduce_ex__(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> typing.Any:
         ...
@@ -928,7 +927,7 @@ class Simulator:
         Returns hypothetical observations, in which some boxes of the world are hidden and other boxes are inserted. Only the
         entity set `partners` differs from the actual observation. The state is unchanged. pictura.make_queries() creates the
         first three arguments. All arrays must be in the simulator's memory.
-
+        
         queries: QUERY_DTYPE [n], or uint8 [n, 24]: for each query the observing slot, its ranges [begin, end) in `hidden` and
         `inserted`, and leaves_gaps. If leaves_gaps is 0, boxes further away replace hidden partners; if it is 1, rows of zeros
         replace them.
@@ -941,7 +940,7 @@ class Simulator:
     def reset(self, world_mask: typing.Any = None, seed: typing.SupportsInt | typing.SupportsIndex | None = None) -> None:
         """
         Starts new episodes.
-
+        
         world_mask: uint8 or bool [worlds] in the simulator's memory, true for worlds to reset; default: all worlds.
         seed: seed of these worlds from now on; default: the simulator's seed.
         Raises pictura.Error for a mask of another shape, type or device.
@@ -967,7 +966,7 @@ class Simulator:
     def set_state(self, slots: typing.Any, fields: dict) -> None:
         """
         Sets fields of agents, and updates their lanes, heights, boxes, views and observations.
-
+        
         slots: int32 [n], without duplicates. fields: arrays [n] or [n, numbers per agent], with names and types of
         AGENT_FIELDS. All arrays must be in the simulator's memory. Raises pictura.Error, which names an invalid value. On CUDA,
         invalid values raise the error in check() or a later call.
@@ -993,7 +992,7 @@ class Simulator:
     def step(self, actions: typing.Any) -> typing.Any:
         """
         Advances every world by one step. Returns the StepResult.
-
+        
         actions: int32 [slots] in the simulator's memory, in [0, 12). An action is 3 times the index of the longitudinal jerk
         (-15, -4, 0, 4 m/s3) plus the index of the lateral jerk (-4, 0, 4 m/s3, left is positive). Actions of inactive agents
         are ignored.
@@ -1113,7 +1112,7 @@ class Recorder:
     """
     Records one world as a replay. The simulator must be on the CPU. While the recorder exists, it records every step of the
     simulator, by any function.
-
+    
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
         >>> recorder = pictura.Recorder(simulator, follow=0)
@@ -1156,7 +1155,7 @@ class LiveView:
     Live page in the browser, which shows the only world of a simulator while it runs. The simulator must be on the CPU. The
     page can pause the simulator, take single steps, change the speed, and drive an agent with the keyboard. Steps of the
     simulator wait, so that they run in real time or at the speed that the page sets.
-
+    
     Examples:
         >>> simulator = pictura.Simulator([pictura.Map.load('procedural:3')], [(0, 8)])
         >>> view = pictura.LiveView(simulator, wait_for_page=False)
@@ -1226,7 +1225,7 @@ def draw_worlds(seed: typing.SupportsInt | typing.SupportsIndex, num_slots: typi
     """
     Draws random worlds until they fill the slots. The number of agents of a world is uniform in [min_agents, max_agents].
     Worlds use the maps in turn. Returns (index of the map, number of agents, global world) of each world.
-
+    
     Examples:
         >>> worlds = pictura.draw_worlds(seed=1, num_slots=100, min_agents=5, max_agents=40, num_maps=2)
         >>> sum(agents for _, agents, _ in worlds)
@@ -1235,7 +1234,7 @@ def draw_worlds(seed: typing.SupportsInt | typing.SupportsIndex, num_slots: typi
 def known_towns() -> list[str]:
     """
     Returns the names of the towns in the map folder, sorted.
-
+    
     Examples:
         >>> pictura.known_towns()      # doctest: +SKIP
         ['Town01', 'Town02', 'Town03']
@@ -1243,7 +1242,7 @@ def known_towns() -> list[str]:
 def make_views(origin_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], heading_rad: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], *, world: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, ego_agent: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, body_length_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32] | None = None) -> numpy.ndarray[typing.Any, numpy.dtype[typing.Any]]:
     """
     Returns views (poses of a rig) as a NumPy array of VIEW_DTYPE [n].
-
+    
     Args:
         origin_m: [n, 3], origins of the rig on the ground, in metres.
         heading_rad: [n], headings in radians.
@@ -1251,10 +1250,10 @@ def make_views(origin_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32]
         ego_agent: [n], index of the box in the scene that is not drawn in the view; -1: none.
         body_length_m: [n], lengths of the bodies that carry the rig. Bodies shorter than 4.5 m move the cameras closer to
             the origin.
-
+    
     Raises:
         pictura.Error: An array has another shape.
-
+    
     Examples:
         >>> pictura.make_views(origin_m=[[0, 0, 0], [5, 0, 0]], heading_rad=[0, 1.5]).shape
         (2,)
@@ -1262,7 +1261,7 @@ def make_views(origin_m: typing.Annotated[numpy.typing.ArrayLike, numpy.float32]
 def map_folder() -> str:
     """
     Returns the folder in which load() looks for towns: $PICTURA_DATA, or the user's data folder.
-
+    
     Examples:
         >>> isinstance(pictura.map_folder(), str)
         True
@@ -1270,7 +1269,7 @@ def map_folder() -> str:
 def renderer_names() -> list[str]:
     """
     Returns the renderers of this build.
-
+    
     Examples:
         >>> 'cpu' in pictura.renderer_names()
         True
@@ -1278,7 +1277,7 @@ def renderer_names() -> list[str]:
 def simulator_names() -> list[str]:
     """
     Returns the executors of this build.
-
+    
     Examples:
         >>> 'cpu' in pictura.simulator_names()
         True
@@ -1287,7 +1286,7 @@ def write_gallery(folder: str) -> int:
     """
     Writes FOLDER/index.html, an index of the replays in the folder, sorted from the worst. Returns the number of replays.
     Raises pictura.Error, which names a page that is not a replay.
-
+    
     Examples:
         >>> pictura.write_gallery('replays')            # doctest: +SKIP
         4

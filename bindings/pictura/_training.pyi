@@ -10,7 +10,7 @@ class PolicySession:
     """
     Saved policy, with the world and cameras of its training. It computes actions from observations and images. Only one
     thread at a time may use a session and the renderers that are passed to it.
-
+    
     Examples:
         >>> session = pictura.PolicySession('models/perspective.safetensors')
         >>> town = pictura.Map.load('procedural:3')
@@ -35,7 +35,7 @@ class PolicySession:
     def evaluate(self, observations: dict, *, scene: pictura._pictura.Scene = None, views: typing.Any = None, renderer: typing.Any = None, is_drawn: typing.Any = None) -> tuple:
         """
         Returns logits float32 [batch, 12] and values float32 [batch], on the session's device.
-
+        
         observations: arrays [batch, ...] by name, like pictura.Simulator.observations.
         scene, views, renderer: needed by policies that read images. views is [batch], and the renderer is from make_renderer().
         is_drawn: uint8 [batch], 0 where images are black instead of drawn; default: all images are drawn.
@@ -48,7 +48,7 @@ class PolicySession:
     def make_controller(self, simulator: typing.Any, renderer: typing.Any = None, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> typing.Any:
         """
         Returns a pictura.Controller that drives agents of a simulator with the policy.
-
+        
         simulator: a simulator on the session's device.
         renderer: needed by policies that read images: a renderer from make_renderer(), with the simulator's geometries.
         argmax: whether to take the most likely action. Otherwise actions are sampled as in training, with random numbers keyed
@@ -75,11 +75,11 @@ class PolicySession:
 def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller: str | collections.abc.Callable = '', densities: collections.abc.Sequence[str] = ['light', 'medium', 'dense'], agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, others: dict = {}, first_scenario: typing.SupportsInt | typing.SupportsIndex = 0, scenarios: typing.SupportsInt | typing.SupportsIndex = 200, steps: typing.SupportsInt | typing.SupportsIndex = 3000, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, light_cycles: str = '', light_heads: str = '', on_progress: typing.Any = None) -> dict:
     """
     Runs the paper's evaluation, like `pictura evaluate`, in worlds that are not used for training.
-
+    
     Returns a dict. `rows` has one dict for each density and driver (None: the evaluated driver), with counts, and metrics
     as (value, half width of the 95 % interval). The other names are seconds, agent_steps, policy_hash, light_cycles, others
     and camera_severity.
-
+    
     Args:
         checkpoint: File of a policy; '' with `controller`, which then drives in the paper's world.
         maps: Names, files, or ranges such as procedural:1-64.
@@ -113,11 +113,11 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
         light_cycles: 'phases' or 'independent'; '': as in training.
         light_heads: 'as_mapped' or 'visible'; '': as in training.
         on_progress: Function that is called with the completed fraction and the remaining seconds, from a separate thread.
-
+    
     Raises:
         KeyboardInterrupt: The user pressed ^C.
         pictura.Error: An input is invalid; the message names file and key.
-
+    
     Examples:
         >>> options = {'scenarios': 1, 'steps': 20, 'agents_per_world': 8}
         >>> rows = pictura.evaluate('models/perspective.safetensors', ['procedural:1'], **options)['rows']
@@ -129,16 +129,16 @@ def evaluate_robust(checkpoint: str, *, controller: str | collections.abc.Callab
     """
     Runs the robust protocol, like `pictura evaluate --protocol robust`: a fixed set of conditions with generated towns,
     other drivers and randomized cameras (docs/how-to/robust_benchmark.md).
-
+    
     checkpoint: file of a policy; '' with `controller`, a name or a function as for evaluate().
     scenarios: scenarios per condition. Another number than the default gives a trial, not a result of the benchmark.
     The other arguments are those of evaluate(). The benchmark fixes seed, conditioning and camera_severity.
-
+    
     Returns a dict. `rows` has one dict for each condition: part, name, not_driven (the reason if the condition does not
     apply, else None), counts, and metrics as (value, half width of the 95 % interval). `pooled` has the metrics over all
     conditions of 'towns', 'others', 'cameras' and 'all'. The other names are seconds, agent_steps and policy_hash. ^C
     raises KeyboardInterrupt.
-
+    
     Examples:
         >>> report = pictura.evaluate_robust('models/perspective.safetensors', scenarios=2)  # doctest: +SKIP
         >>> report['pooled']['towns']['km_per_infraction']                                   # doctest: +SKIP
@@ -147,12 +147,12 @@ def evaluate_robust(checkpoint: str, *, controller: str | collections.abc.Callab
 def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, protocol: str = 'womd', controller: str | collections.abc.Callable = '', control: str | None = None, start_step: typing.SupportsInt | typing.SupportsIndex | None = None, steps: typing.SupportsInt | typing.SupportsIndex | None = None, densities: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] | None = None, rules: dict = {}, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, num_scenes: typing.SupportsInt | typing.SupportsIndex = 0, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, rollouts: str = '', realism: str = '', on_progress: typing.Any = None) -> dict:
     """
     Runs the paper's zero-shot evaluation in recorded scenes, like `pictura evaluate --protocol`.
-
+    
     Returns a dict. `rows` has one dict for each density, with metrics as (value, half width of the 95 % interval). `agents`
     has one dict for each driven road user in each scene, density and rollout. `realism`, if requested, is the result of
     pictura.realism.score_file(). The other names are scenes, scored, without_drivers, faults (skipped scenes with reasons),
     seconds, agent_steps and policy_hash.
-
+    
     checkpoint: file of a policy; '' with `controller`.
     scenes: files, folders, or 'FILE#K' for scene K of a file.
     protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents'.
@@ -164,9 +164,9 @@ def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, p
     realism: '2024' or '2025', the version of the realism score of these rollouts (docs/explanation/realism.md). It needs no
     rollouts file.
     The other arguments are those of evaluate().
-
+    
     ^C raises KeyboardInterrupt. Raises pictura.Error if no scene can be used.
-
+    
     Examples:
         >>> results = pictura.evaluate_scenes('models/vector.safetensors', ['validation'])   # doctest: +SKIP
         >>> results['scored'], len(results['faults'])                                        # doctest: +SKIP
@@ -175,10 +175,10 @@ def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, p
 def probe_corner(policies: collections.abc.Sequence[str | collections.abc.Callable], maps: collections.abc.Sequence[str], *, agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, density: str = 'medium', scenes: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, sample_steps: typing.SupportsInt | typing.SupportsIndex = 5, batch: typing.SupportsInt | typing.SupportsIndex = 256, pairs: typing.SupportsInt | typing.SupportsIndex = 200, max_distance_m: typing.SupportsFloat | typing.SupportsIndex = 25.0, min_speed_mps: typing.SupportsFloat | typing.SupportsIndex = 2.0, user_range_m: typing.SupportsFloat | typing.SupportsIndex = 50.0, driver: str = '', control: str = 'none', argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, light_cycles: str = '', light_heads: str = '', cases_file: str = '', replay: str = '', case: typing.SupportsInt | typing.SupportsIndex | None = None, cameras: bool = False, on_progress: typing.Any = None) -> typing.Any:
     """
     Measures how policies approach blind corners with a hidden vehicle, and similar empty corners, like `pictura probe corner`.
-
+    
     A case is a pair of runs: one at a corner that hides a vehicle, and one at a similar empty corner. Returns a dict with
     the contents of the command's summary.json (docs/explanation/probes.md).
-
+    
     pairs: total number of pairs.
     max_distance_m: maximum distance in metres from the corner at which a policy takes over the ego.
     min_speed_mps: minimum speed of the ego at the takeover, and of the hidden vehicle.
@@ -189,9 +189,9 @@ def probe_corner(policies: collections.abc.Sequence[str | collections.abc.Callab
     cases_file: CSV file to write, with one row for each run.
     case: number of the replayed pair; default: the pair in the example figure of `pictura probe corner`.
     The other arguments are those of probe_removal().
-
+    
     ^C raises KeyboardInterrupt. Raises pictura.Error, which names file and key of an invalid input.
-
+    
     Examples:
         >>> policies, maps = ['models/perspective.safetensors'], ['procedural:1']
         >>> pictura.probe_corner(policies, maps, pairs=20, cases_file='pairs.csv')           # doctest: +SKIP
@@ -200,10 +200,10 @@ def probe_pedestrian(policies: collections.abc.Sequence[str | collections.abc.Ca
     """
     Measures how policies' value and braking change as a pedestrian emerges from behind a vehicle and is hidden again, like `pictura
     probe pedestrian`.
-
+    
     The pedestrian is placed at points along a path in one fixed state. The path begins behind a vehicle, which hides the
     pedestrian from the ego. Returns a dict with the contents of the command's summary.json (docs/explanation/probes.md).
-
+    
     paths: total number of paths, each in one state.
     hider_range_m: maximum distance in metres of the vehicle behind which a path begins.
     min_speed_mps: minimum forward speed of the ego.
@@ -211,9 +211,9 @@ def probe_pedestrian(policies: collections.abc.Sequence[str | collections.abc.Ca
     control: control experiment: 'none', 'nobody' or 'untrained' (docs/explanation/probes.md).
     cases_file: CSV file to write, with one row for each point of each path.
     The other arguments are those of probe_removal().
-
+    
     ^C raises KeyboardInterrupt. Raises pictura.Error, which names file and key of an invalid input.
-
+    
     Examples:
         >>> policies, maps = ['models/perspective.safetensors'], ['procedural:1']
         >>> pictura.probe_pedestrian(policies, maps, paths=8, cases_file='paths.csv')        # doctest: +SKIP
@@ -221,10 +221,10 @@ def probe_pedestrian(policies: collections.abc.Sequence[str | collections.abc.Ca
 def probe_removal(policies: collections.abc.Sequence[str | collections.abc.Callable], maps: collections.abc.Sequence[str], *, agents_per_world: typing.SupportsInt | typing.SupportsIndex = 0, steps: typing.SupportsInt | typing.SupportsIndex = 600, density: str = 'medium', scenes: typing.SupportsInt | typing.SupportsIndex = 0, first_scene: typing.SupportsInt | typing.SupportsIndex = 0, sample_steps: typing.SupportsInt | typing.SupportsIndex = 10, batch: typing.SupportsInt | typing.SupportsIndex = 4096, removals: typing.SupportsInt | typing.SupportsIndex = 88000, range_m: typing.SupportsFloat | typing.SupportsIndex = 50.0, control: str = 'none', argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, light_cycles: str = '', light_heads: str = '', cases_file: str = '', replay: str = '', case: typing.SupportsInt | typing.SupportsIndex | None = None, cameras: bool = False, on_progress: typing.Any = None) -> typing.Any:
     """
     Measures how policies' value and braking change when one road user is removed, like `pictura probe removal`.
-
+    
     A case is one removal of a road user (the user) for one observing agent (the ego) in one state. Returns a dict with the
     contents of the command's summary.json (docs/explanation/probes.md).
-
+    
     policies: checkpoints or safetensors. The world is that of the first policy's training.
     scenes: number of driven scenarios, which are divided equally among the policies. 0: the same number for each map and
     policy, at least two per map.
@@ -239,9 +239,9 @@ def probe_removal(policies: collections.abc.Sequence[str | collections.abc.Calla
     case: number of the replayed case in cases_file; default: the case with the largest change in the first policy's value.
     cameras: whether the replay contains the ego's images of every step.
     The other arguments are those of evaluate().
-
+    
     ^C raises KeyboardInterrupt. Raises pictura.Error, which names file and key of an invalid input.
-
+    
     Examples:
         >>> policies, maps = ['models/perspective.safetensors'], ['procedural:1']
         >>> pictura.probe_removal(policies, maps, removals=200, cases_file='cases.csv')      # doctest: +SKIP
@@ -249,10 +249,10 @@ def probe_removal(policies: collections.abc.Sequence[str | collections.abc.Calla
 def train(config: str, out: str, *, overrides: collections.abc.Sequence[str] = [], old_run: str = 'refuse', init_from: str = '', minutes: typing.SupportsFloat | typing.SupportsIndex = 0.0, on_progress: typing.Any = None, on_notice: typing.Any = None) -> dict:
     """
     Trains a policy by self-play, like `pictura train`, and writes the same files into the folder `out`.
-
+    
     Returns a dict: agent_steps, updates, agent_steps_per_s, episode_return, km_driven, checkpoint, policy_hash and more. ^C
     ends training after the current update, saves a checkpoint, and raises KeyboardInterrupt.
-
+    
     Args:
         config: A TOML file (docs/reference/configuration.md).
         out: Folder for the run's files.
@@ -264,10 +264,10 @@ def train(config: str, out: str, *, overrides: collections.abc.Sequence[str] = [
             agent_steps_per_s, episode_return, eta_s, and scalars (the columns of progress.csv).
         on_notice: Function that is called with the text of a notice. Both functions are called from the training's own
             thread; their exceptions end the training.
-
+    
     Raises:
         pictura.Error: An input is invalid; the message names file and key.
-
+    
     Examples:
         >>> report = pictura.train('configs/smoke.toml', 'runs/mine', old_run='overwrite')
         >>> report['updates']
