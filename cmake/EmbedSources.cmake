@@ -1,6 +1,6 @@
-# Runs at every build in which a source changed: writes OUTPUT, a C++ file with the text of ROOTS and of every pictura
-# header that they include, as declared in backend_cuda/renderer/kernel_sources.h. Paths are relative to SOURCE_DIR. Fails
-# if one of them is not among DEPENDENCIES (absolute paths), because a change to it would not embed it again.
+# Script that runs at every build in which a source changed. Writes OUTPUT, a C++ file with the texts of ROOTS and of
+# all pictura headers that they include, as declared in backend_cuda/renderer/kernel_sources.h. Paths are relative to
+# SOURCE_DIR. Fails if a header is missing in DEPENDENCIES (absolute paths), because its changes would not be embedded.
 cmake_minimum_required(VERSION 3.25)
 set(files ${ROOTS})
 set(entries "")

@@ -1,6 +1,6 @@
-# Runs at every build in which a source changed: writes OUTPUT, a C++ file of the functions that HEADER declares in
-# namespace NAMESPACE, one for each of TEXTS: the text of a file NAME.ENDING in SOURCE_DIR as NAME_ENDING(), in which each
-# {{file FILE}} is replaced by the text of a file beside it.
+# Script that runs at every build in which a source changed. Writes OUTPUT, a C++ file with functions that HEADER
+# declares in namespace NAMESPACE. For each file NAME.ENDING of TEXTS in SOURCE_DIR, the function NAME_ENDING() returns
+# the text of the file. In the text, each {{file FILE}} is replaced by the text of that file in the same folder.
 cmake_minimum_required(VERSION 3.25)
 set(functions "")
 foreach(file ${TEXTS})
@@ -12,7 +12,7 @@ foreach(file ${TEXTS})
     file(READ ${SOURCE_DIR}/${name} part)
     string(REPLACE "${mark}" "${part}" text "${text}")
   endforeach()
-  # Compilers accept texts of 64 KiB; adjacent texts are concatenated.
+  # Compilers accept string literals of 64 KiB, and concatenate adjacent literals.
   string(LENGTH "${text}" length)
   set(literals "")
   set(at 0)

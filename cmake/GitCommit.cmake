@@ -1,5 +1,5 @@
-# Runs at every build: writes OUTPUT with the commit of the sources (COMMIT, or git's answer if that is empty), only when
-# the commit changes.
+# Script that runs at every build. Writes OUTPUT with the commit of the sources, but only if the commit has changed. The
+# commit is COMMIT, or git's answer if COMMIT is empty.
 set(commit "${COMMIT}")
 if(commit STREQUAL "")
   execute_process(COMMAND git -C ${SOURCE} describe --always --dirty --abbrev=12

@@ -16,7 +16,7 @@ if(NOT PICTURA_WITH_CUDA STREQUAL OFF)
     set(CMAKE_CUDA_STANDARD_REQUIRED ON)
     find_package(CUDAToolkit 12.8 REQUIRED)
     set(PICTURA_HAS_CUDA ON)
-    # Device code has the same arithmetic contract as the host.
+    # Device code rounds like host code: without fused multiply-add.
     add_compile_options(
       "$<$<COMPILE_LANGUAGE:CUDA>:--fmad=false;-Xcompiler=-Wall,-Wextra,-ffp-contract=off>"
       "$<$<AND:$<COMPILE_LANGUAGE:CUDA>,$<BOOL:${PICTURA_WERROR}>>:-Werror=all-warnings;-Xcompiler=-Werror>")

@@ -1,11 +1,13 @@
-# install(EXPORT): find_package(pictura COMPONENTS renderer) defines pictura::renderer and pictura::common; `simulator` adds
-# pictura::map, pictura::simulator and pictura::make_simulator. `command` is the program.
+# Installed components. find_package(pictura COMPONENTS renderer) defines pictura::renderer and pictura::common. The
+# component simulator adds pictura::map, pictura::simulator and pictura::make_simulator. The component command is the
+# program.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/pictura)
 set(header_folder ${CMAKE_INSTALL_INCLUDEDIR}/pictura)
 
-# pictura_install_component(NAME TARGETS...): the libraries of a component, with usage requirements only.
+# pictura_install_component(NAME TARGETS...): installs the libraries of a component. Flags of this build are not
+# exported.
 function(pictura_install_component name)
   install(TARGETS ${ARGN} EXPORT pictura-${name} COMPONENT ${name}
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${name}
@@ -44,7 +46,7 @@ if(PICTURA_HAS_CUDA)
   list(APPEND simulator_libraries pictura_simulator_cuda)
 endif()
 pictura_install_component(simulator ${simulator_libraries})
-# Installs only the headers that call the importers: the others include pugixml and Eigen.
+# Installs only headers that call the importers, because the other headers include pugixml and Eigen.
 install(FILES ${PROJECT_SOURCE_DIR}/map/opendrive/opendrive.h DESTINATION ${header_folder}/map/opendrive
   COMPONENT simulator)
 install(FILES ${PROJECT_SOURCE_DIR}/map/procedural/procedural_town.h ${PROJECT_SOURCE_DIR}/map/procedural/town_options.h

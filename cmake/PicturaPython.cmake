@@ -1,5 +1,5 @@
-# Finds Python and pybind11 for bindings/: the Python of Python_EXECUTABLE (as scikit-build-core does), of the virtual
-# environment, or python3 if that imports pybind11.
+# Finds Python and pybind11 for bindings/. The Python is Python_EXECUTABLE, which scikit-build-core sets, or that of the
+# virtual environment, or python3 if it can import pybind11.
 
 set(PICTURA_HAS_PYTHON OFF)
 if(NOT PICTURA_WITH_PYTHON STREQUAL OFF)

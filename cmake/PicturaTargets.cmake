@@ -1,5 +1,5 @@
-# Settings of every target: flags of this build, includes as `pictura/FOLDER/FILE.h` in the tree and when installed,
-# precompiled headers, and tests with their environment.
+# Settings of all targets: flags of this build, include paths, precompiled headers, and tests with their environment.
+# Headers are included as `pictura/FOLDER/FILE.h`, both in the source tree and when installed.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -13,7 +13,7 @@ endif()
 find_package(OpenMP REQUIRED)
 find_package(fmt REQUIRED)
 
-# <build>/include/pictura/FOLDER -> FOLDER: sources include headers by their installed names.
+# Links <build>/include/pictura/FOLDER to each FOLDER, so that sources include headers by their installed names.
 set(PICTURA_INCLUDE_DIR ${PROJECT_BINARY_DIR}/include)
 file(MAKE_DIRECTORY ${PICTURA_INCLUDE_DIR}/pictura)
 foreach(folder bindings common map simulator backend_cpu backend_cuda backend_gl backends configuration policy evaluation training drawing replay driving cli apps bench tests)
@@ -27,39 +27,39 @@ check_cxx_compiler_flag(-mno-fma PICTURA_HAS_MNO_FMA)
 
 set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)  # sources per unity-build batch
 
-# Flags of this build, which installed targets do not pass on.
+# Flags of this build. Users of installed targets do not get them.
 add_compile_options(
   "$<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Woverloaded-virtual>"
   # Designated initializers intentionally leave the other members at their defaults.
   $<$<COMPILE_LANGUAGE:CXX>:-Wno-missing-field-initializers>
-  # Set for libraries and programs alike, so that both can read one precompiled header.
+  # Libraries and programs have the same setting, so that both can use one precompiled header.
   "$<IF:$<COMPILE_LANGUAGE:CUDA>,-Xcompiler=-fPIC,-fPIC>"
-  # g++ 13 assumes that every returned reference refers to a temporary argument, and that fmt's big integers, inlined,
-  # copy more than they hold (fmt 9).
+  # These warnings of g++ 13 are wrong. It assumes that every returned reference refers to a temporary argument, and
+  # that inlined code of fmt 9 copies more digits than its big integers have.
   "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_HAS_WDANGLING_REFERENCE}>>:-Wno-dangling-reference;-Wno-array-bounds;-Wno-stringop-overflow>"
-  # In a unity build every source is included; g++ treats it as a header that could be included several times.
+  # In a unity build sources are included. g++ warns about them as about headers that could be included several times.
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>,$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>:-Wno-subobject-linkage>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_WERROR}>>:-Werror>
-  # The arithmetic contract: no fused multiply-add and no reordering, on every device.
+  # Rules of arithmetic on all devices: no fused multiply-add, and no reordering of operations.
   "$<$<COMPILE_LANGUAGE:CXX>:-ffp-contract=off;-fno-math-errno;-fno-trapping-math>"
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${PICTURA_CPU_ARCH}>>:-march=${PICTURA_CPU_ARCH}>)
 set(PICTURA_IS_SANITIZED 0)  # for tests with time limits
 if(PICTURA_SANITIZE)
   set(PICTURA_IS_SANITIZED 1)
   add_compile_options(-fsanitize=${PICTURA_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
-    # With these checks g++ 13 does not know the length of initializer lists.
+    # With sanitizers, g++ 13 warns wrongly, because it does not know the length of initializer lists.
     "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-Wno-array-bounds;-Wno-stringop-overread>")
   add_link_options(-fsanitize=${PICTURA_SANITIZE})
 endif()
 
-# pictura_use_headers(TARGET SCOPE): requirements of every user of the headers, in the tree and when installed.
+# pictura_use_headers(TARGET SCOPE): sets the requirements of all users of the headers, in the tree and when installed.
 function(pictura_use_headers target scope)
   target_compile_features(${target} ${scope} cxx_std_20)
   target_include_directories(${target} ${scope} $<BUILD_INTERFACE:${PICTURA_INCLUDE_DIR}>)
 endfunction()
 
-# pictura_add_library(NAME SOURCES... [PUBLIC libs...] [PRIVATE libs...]): static library pictura_NAME, alias
-# pictura::NAME.
+# pictura_add_library(NAME SOURCES... [PUBLIC libs...] [PRIVATE libs...]): adds the static library pictura_NAME with the
+# alias pictura::NAME.
 function(pictura_add_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;PUBLIC;PRIVATE")
   add_library(pictura_${name} STATIC ${arg_SOURCES})
@@ -69,38 +69,39 @@ function(pictura_add_library name)
   target_link_libraries(pictura_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
 endfunction()
 
-# pictura_forbid_fma(TARGET): for code that must equal a device bit for bit, because g++ 12 ignores -ffp-contract where it
-# vectorises alternating sums and differences (vfmaddsub).
+# pictura_forbid_fma(TARGET): disables FMA instructions, for code whose results must equal a device's bit for bit. g++
+# 12 ignores -ffp-contract when it vectorises alternating sums and differences (vfmaddsub).
 function(pictura_forbid_fma target)
   if(PICTURA_HAS_MNO_FMA)
     target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-mno-fma>)
   endif()
 endfunction()
 
-# pictura_leave_unoptimized(TARGET): for code that only calls optimized code. For a test, optimization takes a compiler
-# three quarters of its time.
+# pictura_leave_unoptimized(TARGET): disables optimization, for code that only calls optimized code. Optimization takes
+# three quarters of the time to compile a test.
 function(pictura_leave_unoptimized target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O0>)
 endfunction()
 
-# pictura_optimize_little(TARGET): for code that reads options and prints results, whose templates compile slowly.
+# pictura_optimize_little(TARGET): reduces optimization, for code that reads options and prints results, because its
+# templates compile slowly.
 function(pictura_optimize_little target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O1>)
 endfunction()
 
-# pictura_compile_together(TARGET): with PICTURA_UNITY it compiles several sources as one, for code whose per-source
-# templates take a compiler longer than the rest. Libraries that others build upon are compiled source by source, so
-# that a missing include causes an error.
+# pictura_compile_together(TARGET): with PICTURA_UNITY, compiles several sources as one, for code whose templates take
+# most of the time to compile each source. Libraries that other libraries use are compiled source by source, so that a
+# missing include causes an error.
 function(pictura_compile_together target)
   if(PICTURA_UNITY)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON)
   endif()
 endfunction()
 
-# pictura_precompile(NAME HEADERS [LINK libs...]): a precompiled header of libraries' headers, which take a compiler
-# longer than most sources that include them; pictura_use_precompiled(TARGET NAME) uses it. Headers of the project and
-# of the standard library are excluded, so that a source without a needed include does not compile, unless HEADERS
-# include it. PICTURA_PRECOMPILE=OFF compiles every source on its own.
+# pictura_precompile(NAME HEADERS [LINK libs...]): adds a precompiled header of headers of libraries, which take longer
+# to compile than most sources that include them. pictura_use_precompiled(TARGET NAME) uses it. It does not contain
+# headers of the project and of the standard library, except those that HEADERS include, so that a missing include
+# causes an error. PICTURA_PRECOMPILE=OFF disables precompiled headers.
 function(pictura_precompile name headers)
   if(PICTURA_PRECOMPILE)
     cmake_parse_arguments(PARSE_ARGV 2 arg "" "" "LINK")
@@ -118,7 +119,7 @@ function(pictura_use_precompiled target name)
   endif()
 endfunction()
 
-# pictura_test_properties(OUT SECONDS LABELS): ctest properties with a timeout, labels and the tests' environment.
+# pictura_test_properties(OUT SECONDS LABELS): sets OUT to ctest properties: a timeout, labels and the environment.
 function(pictura_test_properties out timeout_s labels)
   set(properties TIMEOUT ${timeout_s})
   if(labels)
@@ -127,7 +128,7 @@ function(pictura_test_properties out timeout_s labels)
   endif()
   set(environment ${PICTURA_TEST_ENVIRONMENT})
   if(gpu IN_LIST labels)
-    # Kernels of a rig take seconds to compile, so tests share them.
+    # Tests share a cache of compiled kernels, because the kernels of a rig take seconds to compile.
     list(REMOVE_ITEM environment PICTURA_CACHE=off)
     list(APPEND environment XDG_CACHE_HOME=${PROJECT_BINARY_DIR}/cache)
   endif()
@@ -139,10 +140,11 @@ function(pictura_test_properties out timeout_s labels)
 endfunction()
 
 # pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...] [PRECOMPILED header] [WHOLE suites...] [OPTIMIZED]):
-# GoogleTest binary NAME_test, with a ctest entry for each test, and PICTURA_DATA set to ../shared/data if that exists
-# and the caller has not set it. WHOLE: suites whose tests share expensive results, one entry each. OPTIMIZED: for tests
-# with much computation of their own. The label threads marks tests of code that runs on several threads: the target
-# threaded_tests builds them, and the preset tsan runs only these.
+# adds the GoogleTest binary NAME_test, with a ctest entry for each test. PICTURA_DATA is set to ../shared/data if this
+# folder exists and the caller has not set the variable. WHOLE: suites with one entry each, because their tests share
+# expensive results. OPTIMIZED: compiles the test with optimization, for tests with much computation. The label threads
+# marks tests of code that runs on several threads: the target threaded_tests builds only these tests, and the preset
+# tsan runs only these.
 add_custom_target(threaded_tests)
 function(pictura_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "OPTIMIZED" "PRECOMPILED" "SOURCES;LINK;LABELS;WHOLE")
@@ -150,13 +152,13 @@ function(pictura_add_test name)
   include(GoogleTest)
   add_executable(${name}_test ${arg_SOURCES})
   pictura_use_headers(${name}_test PRIVATE)
-  # OpenMP also for tests that do not need it, since a precompiled header requires equal flags.
+  # All tests use OpenMP, because a precompiled header requires equal flags.
   target_link_libraries(${name}_test PRIVATE ${arg_LINK} OpenMP::OpenMP_CXX GTest::gmock GTest::gtest_main)
   pictura_compile_together(${name}_test)
   if(arg_PRECOMPILED)
     pictura_use_precompiled(${name}_test ${arg_PRECOMPILED})
   else()
-    # Many tests compute with the rules shared by both devices.
+    # Many tests compute with functions that the host and CUDA share.
     pictura_forbid_fma(${name}_test)
     if(NOT arg_OPTIMIZED)
       pictura_use_precompiled(${name}_test gtest)
@@ -182,8 +184,8 @@ function(pictura_add_test name)
   gtest_discover_tests(${name}_test ${filter} DISCOVERY_TIMEOUT 120 PROPERTIES ${properties})
 endfunction()
 
-# Environment of tests. Maps are not cached, so that the importer just built is tested. Torch's idle threads sleep,
-# since spinning threads of parallel tests would compete for the processor.
+# Environment of tests. Maps are not cached, so that tests use the importer of this build. Torch's idle threads sleep,
+# because spinning threads of parallel tests would compete for the processor.
 set(PICTURA_TEST_ENVIRONMENT PICTURA_CACHE=off OMP_WAIT_POLICY=passive)
 if(NOT DEFINED ENV{PICTURA_DATA} AND EXISTS ${PROJECT_SOURCE_DIR}/../shared/data)
   get_filename_component(data_folder ${PROJECT_SOURCE_DIR}/../shared/data REALPATH)
@@ -192,8 +194,8 @@ endif()
 if(PICTURA_SANITIZE MATCHES thread)
   list(APPEND PICTURA_TEST_ENVIRONMENT TSAN_OPTIONS=ignore_noninstrumented_modules=1:die_after_fork=0)
 elseif(PICTURA_SANITIZE MATCHES address)
-  # The sanitizer guesses the location of thread-local variables of libraries loaded at run time from the preceding
-  # words; with Mesa's libraries it may guess wrong and abort.
+  # The sanitizer guesses where libraries that are loaded at run time have thread-local variables. For Mesa's libraries
+  # it may guess wrong and abort.
   list(APPEND PICTURA_TEST_ENVIRONMENT ASAN_OPTIONS=intercept_tls_get_addr=0 UBSAN_OPTIONS=print_stacktrace=1
     LSAN_OPTIONS=suppressions=${PROJECT_SOURCE_DIR}/tests/support/leaks.txt:print_suppressions=0)
 endif()

@@ -1,5 +1,5 @@
-# libtorch from the torch wheel of the Python that Python_EXECUTABLE names (as scikit-build-core does), of the virtual
-# environment, or of python3, as one imported target `pictura_torch`.
+# Defines the imported target `pictura_torch`: libtorch from the torch wheel of a Python. The Python is
+# Python_EXECUTABLE, which scikit-build-core sets, or that of the virtual environment, or python3.
 # The wheel's own CMake package is not used: it requires nvcc for CPU targets and links CUDA into everything.
 
 set(PICTURA_HAS_TORCH OFF)
@@ -26,11 +26,11 @@ if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
       ${torch_root}/include ${torch_root}/include/torch/csrc/api/include)
     # By name, not by path: the wheel's folder also contains a libgomp, which the program then loads.
     target_link_libraries(pictura_torch INTERFACE -L${torch_root}/lib -ltorch_cpu -lc10)
-    # A wheel contains no path of the build machine; it finds torch in its environment (bindings/).
+    # A wheel must not contain paths of the build machine. It finds torch in its environment (bindings/CMakeLists.txt).
     if(NOT SKBUILD)
       target_link_libraries(pictura_torch INTERFACE -Wl,-rpath,${torch_root}/lib)
     endif()
-    # Torch includes Gloo, for several processes on the host, but not its headers (libgloo-dev).
+    # Torch contains the library Gloo, with which processes communicate on the host, but not its headers (libgloo-dev).
     find_path(PICTURA_GLOO_INCLUDE gloo/context.h)
     if(PICTURA_GLOO_INCLUDE)
       set(PICTURA_HAS_GLOO ON)

@@ -1,4 +1,5 @@
-# Runs at every build in which one of SOURCES changed: writes OUTPUT with a hash of their contents and of COMPILER.
+# Script that runs at every build in which one of SOURCES changed. Writes OUTPUT with a hash of the contents of SOURCES
+# and of COMPILER.
 set(hashes "${COMPILER}")
 foreach(source ${SOURCES})
   file(SHA256 ${source} hash)

@@ -1,4 +1,4 @@
-# The embedded kernels are refused where a header that they include is not among the files that they are built from.
+# Tests that embedding fails if a kernel includes a header that is missing in the list of dependencies.
 file(REMOVE_RECURSE ${FOLDER})
 file(WRITE ${FOLDER}/common/a.h "#include \"pictura/common/b.h\"\n")
 file(WRITE ${FOLDER}/common/b.h "\n")

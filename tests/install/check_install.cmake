@@ -1,5 +1,5 @@
-# WHAT WholeBuild installs BUILD into a fresh prefix and compiles every header that it installs; RendererAlone builds and
-# installs the renderer alone, where pugixml and torch cannot be found. Then both build the consumer and run it.
+# If WHAT is WholeBuild: installs BUILD into an empty prefix, and compiles every installed header. If WHAT is
+# RendererAlone: builds and installs only the renderer, without pugixml and torch. Then builds and runs the consumer.
 function(run)
   execute_process(COMMAND ${ARGV} COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
@@ -39,7 +39,7 @@ if(bytes LESS 4000)
   message(FATAL_ERROR "${SCRATCH}/car.png: expected a picture with a car and two lines, got ${bytes} bytes")
 endif()
 
-# What is not installed is named.
+# The error message must name a component that is not installed.
 file(MAKE_DIRECTORY ${SCRATCH}/asks)
 file(WRITE ${SCRATCH}/asks/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)
 project(asks LANGUAGES CXX)

@@ -1,4 +1,4 @@
-# The importer's fingerprint changes with any byte of any source and with the compiler, and with nothing else.
+# Tests that the importer's fingerprint depends on every byte of every source and on the compiler, and on nothing else.
 file(MAKE_DIRECTORY ${FOLDER})
 set(sources ${FOLDER}/a.h ${FOLDER}/b.cpp)
 function(fingerprint result compiler)
