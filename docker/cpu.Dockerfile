@@ -1,7 +1,7 @@
-# pictura on CPUs: the command and the Python package.
+# Image for CPUs, with the command and the Python package of pictura.
 #   docker build -f docker/cpu.Dockerfile -t pictura .
 #   docker run --rm -v "$PWD:/data" pictura map procedural:7 --png town.png
-# With training: --build-arg TORCH=torch==2.11.0 (docs/how-to/docker.md says how it stays small).
+# For training add --build-arg TORCH=torch==2.11.0 (docs/how-to/docker.md explains how to keep the image small).
 ARG BASE=debian:12-slim
 FROM ${BASE} AS build
 ARG TORCH=""

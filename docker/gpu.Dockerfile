@@ -1,4 +1,4 @@
-# pictura on NVIDIA GPUs, with training. CUDA's libraries at run time are those that torch's wheel brings along.
+# Image for NVIDIA GPUs, with training. At run time it uses the CUDA libraries of torch's wheel.
 #   docker build -f docker/gpu.Dockerfile -t pictura-gpu .
 #   docker run --rm --gpus all -v "$PWD:/data" pictura-gpu train --config demo.toml --out runs/demo
 ARG BASE=ubuntu:24.04
