@@ -25,23 +25,23 @@ template <typename Visitor>
 void visit_options(CornerOptions& options, Visitor&& v) {
   visit_options(static_cast<ProbeOptions&>(options), v);
   CornerSearch& search = options.search;
-  v.value({"pairs", "--pairs", "Total number of pairs: a corner with a hidden vehicle, and an empty corner", 1},
+  v.value({"pairs", "--pairs", "Total number of pairs of a corner with a hidden vehicle and a similar empty corner", 1},
           options.pairs);
-  v.value({"max_distance_m", "--max-distance",
-           "Maximum distance before the corner at which a policy takes over, m; at least 8 m", 8.1, kCornerLead_m},
-          search.max_distance_m);
+  v.value(
+      {"max_distance_m", "--max-distance",
+       "Maximum distance in m from the ego to the corner when a policy takes over; more than 8", 8.1, kCornerLead_m},
+      search.max_distance_m);
   v.value({"min_speed_mps", "--min-speed",
-           "Minimum forward speed of the ego at the takeover and of the hidden vehicle, m/s", -100, 100},
+           "Minimum forward speed in m/s of the ego at the takeover, and of the hidden vehicle", -100, 100},
           search.min_speed_mps);
   v.value(
-      {"user_range_m", "--range", "Maximum distance of the hidden vehicle before the junction, m", 1, kCornerLead_m},
+      {"user_range_m", "--range", "Maximum distance in m from the hidden vehicle to the junction", 1, kCornerLead_m},
       search.user_range_m);
-  v.name({"driver", "--driver",
-          "Driver of the scenes in which policies take over, instead of the policies: lane, the lane keeper"},
+  v.name({"driver", "--driver", "Driver instead of the policies before the takeovers: lane (follows lanes)"},
          options.worlds.controller, {"lane"});
   v.choice({"control", "--control",
-            "Control: permuted removes another vehicle near the ego instead of the hidden vehicle; untrained uses "
-            "policies with fresh weights in the same states"},
+            "Control experiment: permuted removes another vehicle near the ego instead of the hidden vehicle; "
+            "untrained uses policies with random weights in the same states"},
            options.control, kCornerControlNames);
 }
 

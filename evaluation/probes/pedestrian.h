@@ -23,13 +23,16 @@ struct PedestrianOptions : ProbeOptions {
 template <typename Visitor>
 void visit_options(PedestrianOptions& options, Visitor&& v) {
   visit_options(static_cast<ProbeOptions&>(options), v);
-  v.value({"paths", "--paths", "Total number of paths, each through one state; each has a figure", 1}, options.paths);
-  v.value({"hider_range_m", "--range", "Maximum distance of the vehicle behind which a path begins, m", 6, 1000},
+  v.value({"paths", "--paths", "Total number of paths, each in one state and with one figure", 1}, options.paths);
+  v.value({"hider_range_m", "--range", "Maximum distance in m from the ego to the vehicle behind which a path begins",
+           6, 1000},
           options.hider_range_m);
-  v.value({"min_speed_mps", "--min-speed", "Minimum forward speed of the ego, m/s", -100, 100}, options.min_speed_mps);
-  v.value({"height_m", "--height", "Height of the pedestrian, m; vehicles are 1.5 m high", 0.1, 3}, options.height_m);
+  v.value({"min_speed_mps", "--min-speed", "Minimum forward speed of the ego in m/s", -100, 100},
+          options.min_speed_mps);
+  v.value({"height_m", "--height", "Height of the pedestrian in m; vehicles are 1.5 m high", 0.1, 3}, options.height_m);
   v.choice({"control", "--control",
-            "Control: nobody shows no pedestrian; untrained uses policies with fresh weights in the same states"},
+            "Control experiment: nobody shows no pedestrian; untrained uses policies with random weights in the same "
+            "states"},
            options.control, kPedestrianControlNames);
 }
 

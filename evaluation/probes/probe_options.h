@@ -38,13 +38,15 @@ void visit_options(ProbeOptions& probe, Visitor&& v) {
   v.choice({"density", "--density", "light, medium or dense: 60, 120 or 150 agents per world"},
            worlds.densities.front(), kDensityNames);
   v.value({"scenes", "--scenes",
-           "Number of driven scenarios, an equal share per policy; default: equally many on each map for each policy, "
-           "two per map or more",
+           "Number of driven scenarios, divided equally among the policies; default: the same number for each map and "
+           "policy, at least two per map",
            1},
           worlds.scenarios);
   v.value({"first_scene", "--first-scene", "Number of the first scenario", 0}, worlds.first_scenario);
   v.value({"sample_steps", "--every", "Steps between sampled states", 1}, probe.sample_steps);
-  v.value({"batch", "--batch", "Cases in a call, rounded up to whole passes of a network; changes only memory and time",
+  v.value({"batch", "--batch",
+           "Number of cases that are computed together, rounded up to whole passes of the network; affects only memory "
+           "and time",
            1, 1 << 20},
           probe.batch);
 }

@@ -21,12 +21,13 @@ struct RemovalOptions : ProbeOptions {
 template <typename Visitor>
 void visit_options(RemovalOptions& options, Visitor&& v) {
   visit_options(static_cast<ProbeOptions&>(options), v);
-  v.value({"removals", "--removals", "Total number of cases: one user hidden for one ego in one state", 1},
+  v.value({"removals", "--removals",
+           "Total number of cases; in a case, one road user is hidden from one ego in one state", 1},
           options.removals);
-  v.value({"range_m", "--range", "Maximum distance of a user, m", 1, 1000}, options.range_m);
+  v.value({"range_m", "--range", "Maximum distance in m from the ego to the road user", 1, 1000}, options.range_m);
   v.choice({"control", "--control",
-            "Control: nobody hides no user; permuted hides another of the ego's users, redrawn for each case; "
-            "untrained uses policies with fresh weights in the same states"},
+            "Control experiment: nobody hides no road user; permuted hides a random other road user near the ego; "
+            "untrained uses policies with random weights in the same states"},
            options.control, kRemovalControlNames);
 }
 
