@@ -56,27 +56,32 @@ using P = SceneProtocol;
 constexpr std::array kRules{
     word_rule<&P::overlapping, kOverlappingWords>(
         "overlapping", "replay, drive",
-        "vehicles whose initial box touches another box or an edge, or is off the road"),
-    word_rule<&P::others, kOthersWords>("others", "replay, absent", "pedestrians, cyclists and other non-vehicles"),
+        "treatment of vehicles whose initial box touches another box or an edge, or is off the road"),
+    word_rule<&P::others, kOthersWords>("others", "replay, absent",
+                                        "treatment of pedestrians, cyclists and other non-vehicles"),
     word_rule<&P::late, kLateWords>(
         "late", "replay, drive, absent",
-        "vehicles that appear in the recording only after the start; absent: all road users"),
+        "treatment of vehicles that appear only after the start; absent applies to all road users"),
     word_rule<&P::record_end, kRecordEndWords>("record_end", "stand, vanish",
-                                               "road users that follow the recording, after its end"),
+                                               "behaviour of road users that follow the recording, after its end"),
     word_rule<&P::after_infraction, kInfractionWords>("after_infraction", "halt, leave, drive_on",
-                                                      "agents that collided or left the road"),
+                                                      "behaviour of agents that collided or left the road"),
     word_rule<&P::leave_at_goal, kYesNo>("leave_at_goal", "no, yes", "whether agents that arrive are removed"),
     word_rule<&P::waypoints, kWaypointsWords>(
-        "waypoints", "goal, path", "the goal in all three slots, or two points on the recorded path and the goal"),
+        "waypoints", "goal, path",
+        "goal: the goal in all three slots; path: two points on the recorded path, and the goal"),
     number_rule<&P::min_distance_to_goal_m, 0, 1000>(
-        "least_way_m", "0 to 1000", "minimum distance to the goal; nearer road users follow the recording"),
+        "least_way_m", "0 to 1000", "minimum distance to the goal in m; nearer road users follow the recording"),
     word_rule<&P::replay_experts, kYesNo>("replay_experts", "no, yes",
                                           "whether road users marked as expert are replayed"),
-    number_rule<&P::rollouts, 1, 1000>("rollouts", "1 to 1000", "drives of each scene, each with its own draws"),
-    number_rule<&P::max_driven, 0, 4096>("max_driven", "0 to 4096", "maximum number of vehicles per scene; 0: all"),
+    number_rule<&P::rollouts, 1, 1000>("rollouts", "1 to 1000",
+                                       "number of rollouts of each scene, with different random numbers"),
+    number_rule<&P::max_driven, 0, 4096>("max_driven", "0 to 4096",
+                                         "maximum number of driven vehicles per scene; 0: all"),
     number_rule<&P::box_scale, 0, 2>("box_scale", "0 to 2", "scale of lengths and widths of all road users"),
-    number_rule<&P::observed_span_m, 0, 100>("observed_span_m", "0 to 100",
-                                             "longest observed piece of lanes and edges; 0: as in training, 10 m")};
+    number_rule<&P::observed_span_m, 0, 100>(
+        "observed_span_m", "0 to 100",
+        "maximum length of observed pieces of lanes and edges in m; 0: 10 m, as in training")};
 
 std::vector<SceneProtocol> make_protocols() {
   const SceneProtocol paper;
