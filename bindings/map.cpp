@@ -257,7 +257,8 @@ their heights. light_heads: as for Simulator.)")
       .def(
           "draw", [](const Map& self, int width_px, int height_px) { return draw(*self.road(), width_px, height_px); },
           py::arg("width_px") = 1024, py::arg("height_px") = 1024,
-          "Draws the map from above, uint8 [height, width, 3], north up. Sizes from 16 to 8192 px.")
+          "Draws the map from above. Returns uint8 [height, width, 3], with north at the top. Sizes are from 16 to "
+          "8192 px.")
       .def("__repr__", [](const Map& self) {
         return fmt::format("<pictura.Map {}: {} lanes, {:.1f} km>", self.road()->name, self.road()->lanes.size(),
                            self.road()->facts.driving_lane_km);

@@ -10,15 +10,15 @@
 
 PYBIND11_MODULE(_pictura, module) {
   namespace py = pybind11;
-  module.doc() =
-      "The pictura library: maps, scenes, renderers and simulators. Import `pictura`, which has these names.";
+  module.doc() = "The pictura library: maps, scenes, renderers and simulators. Import these names from `pictura`.";
   // The exceptions are never destroyed, because static objects outlive the interpreter.
   static const py::handle error = py::exception<pictura::Error>(module, "Error", PyExc_RuntimeError).release();
   static const py::handle usage_error =
       py::exception<pictura::UsageError>(module, "UsageError", py::make_tuple(error, py::handle(PyExc_ValueError)))
           .release();
-  error.attr("__doc__") = "The work failed; the message names what was expected and what came.";
-  usage_error.attr("__doc__") = "Invalid usage: an argument that does not exist or does not fit the others.";
+  error.attr("__doc__") = "A call failed. The message names the expected and the actual value.";
+  usage_error.attr("__doc__") =
+      "Invalid usage: an argument does not exist, has an invalid value, or conflicts with other arguments.";
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);

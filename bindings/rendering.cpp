@@ -474,7 +474,8 @@ Examples:
            "Creates a rig of 1 to 64 cameras. Raises pictura.Error for another number or an invalid camera.")
       .def_static("paper", paper_rig, py::arg("width_px") = 96, py::arg("height_px") = 54,
                   py::arg("square_pixels") = false,
-                  "Returns the paper's four cameras: front, front left, front right and back. Sizes from 1 to 8192 px.")
+                  "Returns the paper's four cameras: front, front left, front right and back. Image sizes are from 1 "
+                  "to 8192 px.")
       .def_static("load", load_rig, py::arg("path"),
                   "Reads a rig from a TOML file. Raises pictura.Error, which names file, camera and key.")
       .def_readonly("cameras", &Rig::cameras)

@@ -376,9 +376,9 @@ Raises pictura.UsageError for another file extension, and pictura.Error if the f
             return draw(*self.road(), width_px, height_px, self.scenario().get(), self.start_step());
           },
           py::arg("width_px") = 1024, py::arg("height_px") = 1024,
-          R"(Draws the scene from above, uint8 [height, width, 3], north up: the paths of all tracks, and the road users at start_step.
+          R"(Draws the scene from above: the paths of all tracks, and the road users at start_step.
 
-Sizes from 16 to 8192 px.)")
+Returns uint8 [height, width, 3], with north at the top. Sizes are from 16 to 8192 px.)")
       .def(
           "inverse_actions", inverse_actions_of, py::arg("num_threads") = 0,
           R"(Computes the actions with which the simulator's dynamics follow the recording most closely. Returns NumPy arrays by

@@ -86,11 +86,12 @@ Examples:
     >>> result = simulator.step(np.full(4, pictura.IDLE_ACTION, np.int32))
     >>> result.reward.shape, result.reward_terms.shape
     ((4,), (4, 11)))")
-      .def_readonly("reward", &StepArraysOfPython::reward, "float32 [slots].")
+      .def_readonly("reward", &StepArraysOfPython::reward, "float32 [slots]: reward of this step.")
       .def_readonly("terminated", &StepArraysOfPython::terminated,
                     "bool [slots]: an infraction ended the agent's episode in this step.")
       .def_readonly("truncated", &StepArraysOfPython::truncated,
-                    "bool [slots]: the episode ended for another reason: bootstrap.")
+                    "bool [slots]: the episode ended for another reason, so learning must bootstrap from the last "
+                    "observation's value.")
       .def_readonly("valid", &StepArraysOfPython::valid,
                     "bool [slots]: the agent was active when the step began, so training may use the transition.")
       .def_readonly("refusal", &StepArraysOfPython::refusal,

@@ -1,5 +1,5 @@
 """
-The pictura library: maps, scenes, renderers and simulators. Import `pictura`, which has these names.
+The pictura library: maps, scenes, renderers and simulators. Import these names from `pictura`.
 """
 from __future__ import annotations
 import collections.abc
@@ -10,11 +10,11 @@ import typing
 __all__: list[str] = ['AGENT_FIELDS', 'Array', 'BOX_DTYPE', 'COMMAND_DTYPE', 'CONDITIONING_NAMES', 'Camera', 'Controller', 'EVENTS', 'EVENT_TOTALS', 'Error', 'Geometry', 'HAS_CUDA', 'IDLE_ACTION', 'INFRACTIONS', 'INSERTED_DTYPE', 'Images', 'LANE_TYPES', 'LIGHT_STATES', 'LINE_TYPES', 'LiveView', 'Map', 'NUM_ACTIONS', 'OBSERVATION_ARRAYS', 'QUERY_DTYPE', 'REALISM_VERSIONS', 'REWARD_TERMS', 'Recorder', 'Renderer', 'Rig', 'Scenario', 'Scene', 'SceneFile', 'SceneRecorder', 'Simulator', 'Snapshot', 'StepResult', 'TRACK_TYPES', 'UsageError', 'VIEW_DTYPE', 'draw_worlds', 'known_towns', 'make_views', 'map_folder', 'renderer_names', 'simulator_names', 'write_gallery']
 class Error(RuntimeError):
     """
-    The work failed; the message names what was expected and what came.
+    A call failed. The message names the expected and the actual value.
     """
 class UsageError(Error, ValueError):
     """
-    Invalid usage: an argument that does not exist or does not fit the others.
+    Invalid usage: an argument does not exist, has an invalid value, or conflicts with other arguments.
     """
 class Array:
     """
@@ -166,7 +166,7 @@ class Map:
         """
     def draw(self, width_px: typing.SupportsInt | typing.SupportsIndex = 1024, height_px: typing.SupportsInt | typing.SupportsIndex = 1024) -> numpy.typing.NDArray[numpy.uint8]:
         """
-        Draws the map from above, uint8 [height, width, 3], north up. Sizes from 16 to 8192 px.
+        Draws the map from above. Returns uint8 [height, width, 3], with north at the top. Sizes are from 16 to 8192 px.
         """
     def geometry(self, walls: bool = True, wall_seed: typing.SupportsInt | typing.SupportsIndex = 0, light_heads: str = 'as_mapped') -> Geometry:
         """
@@ -263,9 +263,9 @@ class Scenario(Map):
         ...
     def draw(self, width_px: typing.SupportsInt | typing.SupportsIndex = 1024, height_px: typing.SupportsInt | typing.SupportsIndex = 1024) -> numpy.typing.NDArray[numpy.uint8]:
         """
-        Draws the scene from above, uint8 [height, width, 3], north up: the paths of all tracks, and the road users at start_step.
+        Draws the scene from above: the paths of all tracks, and the road users at start_step.
         
-        Sizes from 16 to 8192 px.
+        Returns uint8 [height, width, 3], with north at the top. Sizes are from 16 to 8192 px.
         """
     def inverse_actions(self, num_threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
         """
@@ -508,7 +508,7 @@ class Rig:
     @staticmethod
     def paper(width_px: typing.SupportsInt | typing.SupportsIndex = 96, height_px: typing.SupportsInt | typing.SupportsIndex = 54, square_pixels: bool = False) -> Rig:
         """
-        Returns the paper's four cameras: front, front left, front right and back. Sizes from 1 to 8192 px.
+        Returns the paper's four cameras: front, front left, front right and back. Image sizes are from 1 to 8192 px.
         """
     def __getstate__(self) -> tuple[list[Camera]]:
         ...
@@ -767,7 +767,7 @@ class StepResult:
     @property
     def reward(self) -> typing.Any:
         """
-        float32 [slots].
+        float32 [slots]: reward of this step.
         """
     @property
     def reward_terms(self) -> typing.Any:
@@ -782,7 +782,7 @@ class StepResult:
     @property
     def truncated(self) -> typing.Any:
         """
-        bool [slots]: the episode ended for another reason: bootstrap.
+        bool [slots]: the episode ended for another reason, so learning must bootstrap from the last observation's value.
         """
     @property
     def valid(self) -> typing.Any:
