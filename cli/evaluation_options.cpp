@@ -20,7 +20,7 @@ CLI::Option* add_evaluation_options(CLI::App* command, EvaluateOptions* options_
   add_number_option(command, "--steps", options.steps, "Steps of 0.1 s per scenario", 1);
   CLI::Option* const sampled = add_sampled_option(command, &options.argmax);
   add_seed_option(command, &options.seed, "Seed of the scenarios");
-  add_policy_backend_options(command, "auto, but as in training for the renderer", &options);
+  add_policy_backend_options(command, "auto (renderer: as in training)", &options);
   command
       ->add_option("--conditioning", options.conditioning,
                    "Value that replaces one of the configuration's [evaluate.conditioning] for every agent, for "

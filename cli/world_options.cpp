@@ -112,7 +112,7 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
   add_number_option(command, "--inattentive", others.inattentive, "Share of the agents that see no traffic lights", 0,
                     1);
   add_decision_steps_option(command, &world_out->decision_steps);
-  add_policy_backend_options(command, "auto, but as in training for the renderer", world_out);
+  add_policy_backend_options(command, "auto (renderer: as in training)", world_out);
 }
 
 void resolve_driving_options(const CLI::App& command, WorldOptions* world_inout, int* steps_inout,

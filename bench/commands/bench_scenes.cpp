@@ -104,7 +104,7 @@ void add_scenes_benchmark(CLI::App& bench) {
   add_number_option(command, "--at-once", options.scenes_at_once,
                     "Scenes simulated together; default: 256 on a device, 16 on the host", 1, 100'000);
   add_sampled_option(command, &options.argmax);
-  add_policy_backend_options(command, "auto, but as in training for the renderer", &options);
+  add_policy_backend_options(command, "auto (renderer: as in training)", &options);
   add_threads_option(command, &options.num_threads);
   add_number_option(command, "--repeats", arguments->repeats, "Measurements; the median is printed", 1, 1000);
   command->add_flag("--json", arguments->json, "Print one JSON object");
