@@ -25,8 +25,8 @@ _NUMPY = re.compile(r"numpy\.(_?core\.(multiarray|numeric)\.)?(\w+)")
 def _plain_values(data: bytes) -> Any:
     """Returns the contents of a pickle of NumPy arrays and builtins; object arrays become lists.
 
-    Stand-ins replace the callables that the pickle names. New stand-ins are created for every pickle, because a pickle can
-    modify the objects that it names.
+    Stand-ins replace the callables that the pickle names. New stand-ins are created for every pickle, because a pickle
+    can modify the objects that it names.
     """
 
     class Type:
