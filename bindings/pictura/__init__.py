@@ -100,6 +100,14 @@ def __getattr__(name: str):
     return value
 
 
+def _vector_env():
+    try:
+        from pictura.envs.gymnasium_vector import DriveVectorEnv
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(f"{error}: pip install 'pictura[gymnasium]'", name=error.name) from error
+    return DriveVectorEnv
+
+
 def make_vec(maps=None, num_agents: int | None = None, *, preset: str | None = None, **options):
     """Returns a Gymnasium vector environment of all agents of one or many worlds. Each agent has one slot.
 
@@ -138,8 +146,7 @@ def make_vec(maps=None, num_agents: int | None = None, *, preset: str | None = N
         >>> observations["rgb"].shape
         (8, 4, 3, 18, 32)
     """
-    from pictura.envs.gymnasium_vector import DriveVectorEnv
-
+    DriveVectorEnv = _vector_env()
     if preset is None:
         return DriveVectorEnv("procedural:3" if maps is None else maps, 16 if num_agents is None else num_agents, **options)
     from pictura.presets import preset_options
@@ -171,8 +178,7 @@ def make_vec_for(policy, maps="procedural:3", num_agents: int = 16, **options):
         >>> observations["rgb"].shape
         (4, 4, 3, 18, 32)
     """
-    from pictura.envs.gymnasium_vector import DriveVectorEnv
-
+    DriveVectorEnv = _vector_env()
     path = policy if isinstance(policy, (str, os.PathLike)) else getattr(policy, "metadata", {}).get("path")
     if path is None:
         raise UsageError("policy: expected a file name, or a policy loaded by pictura.torch.load_policy()")

@@ -20,7 +20,10 @@ import warnings
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import torch
+try:
+    import torch
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError("pictura.torch needs torch: pip install 'pictura[train]'", name=error.name) from error
 from torch import Tensor, nn
 from torch.nn import functional
 

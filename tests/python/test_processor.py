@@ -66,15 +66,27 @@ def test_both_builds_give_the_same_bits():
     assert len(found) == 1
 
 
-def test_a_missing_library_of_x_is_named_with_its_remedy():
-    code = """
+@pytest.mark.parametrize(
+    ("module", "error", "statement", "remedy"),
+    [
+        ("pictura._pictura", "ImportError('libXrender.so.1: cannot open shared object file')", "", "apt install libxext6 libxrender1"),
+        ("gymnasium", "ModuleNotFoundError(name='gymnasium')", "pictura.make_vec()", "pip install 'pictura[gymnasium]'"),
+        ("torch", "ModuleNotFoundError(name='torch')", "import pictura.torch", "pip install 'pictura[train]'"),
+    ],
+)
+def test_what_is_missing_is_named_with_its_remedy(module, error, statement, remedy):
+    code = f"""
 import sys
 class Finder:
     def find_spec(self, name, path, target=None):
-        if name == "pictura._pictura":
-            raise ImportError("libXrender.so.1: cannot open shared object file: No such file or directory")
+        if name == "{module}":
+            raise {error}
 sys.meta_path.insert(0, Finder())
+import importlib.util
+find_spec = importlib.util.find_spec
+importlib.util.find_spec = lambda name, package=None: None if name == "{module}" else find_spec(name, package)
 import pictura
+{statement}
 """
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert out.returncode == 1 and "libXrender.so.1" in out.stderr and "apt install libxext6 libxrender1" in out.stderr
+    assert out.returncode == 1 and remedy in out.stderr
