@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "pictura/common/error.h"
+#include "pictura/common/math.h"
 #include "pictura/common/rng.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/map/scenario/scenario.h"
@@ -47,6 +48,19 @@ std::vector<int32_t> takeovers(const CompiledMap& map, const SceneProtocol& prot
   return steps;
 }
 
+/// Replaces the first heading of tracks, from start_step on, that turn by more than this to the next step.
+void repair_first_headings(int32_t start_step, float max_turn_deg, Scenario* scenario_inout) {
+  for (size_t track = 0; track < scenario_inout->tracks.size(); ++track) {
+    const Span<const uint8_t> valid = scenario_inout->valid_of(static_cast<int32_t>(track));
+    const auto first = std::find(valid.begin() + start_step, valid.end(), 1);
+    if (valid.end() - first < 2 || !first[1]) continue;
+    TrackState* const state =
+        &scenario_inout->states[track * valid.size() + static_cast<size_t>(first - valid.begin())];
+    const float turn_rad = wrap_angle(state[1].heading_rad - state[0].heading_rad);
+    if (std::abs(turn_rad) * (180 / kPi) > max_turn_deg) state[0].heading_rad = state[1].heading_rad;
+  }
+}
+
 }  // namespace
 
 std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const SceneProtocol& protocol) {
@@ -56,6 +70,9 @@ std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const ScenePro
   for (RecordedTrack& track : scenario.tracks) {
     track.length_m *= protocol.box_scale;
     track.width_m *= protocol.box_scale;
+  }
+  if (protocol.max_first_turn_deg > 0 && protocol.start_step < scenario.num_steps) {
+    repair_first_headings(protocol.start_step, protocol.max_first_turn_deg, &scenario);
   }
   return std::make_shared<const Scenario>(std::move(scenario));
 }

@@ -9,7 +9,8 @@
 
 namespace pictura {
 
-/// Adapts a scene to a protocol by scaling the scene's boxes. Throws Error if the scene's time step is not 0.1 s.
+/// Adapts a scene to a protocol: scales its boxes, and replaces first headings (SceneProtocol::max_first_turn_deg).
+/// Throws Error if the scene's time step is not 0.1 s.
 std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const SceneProtocol& protocol);
 
 /// Selects the tracks that thinning removes; 1: removed, [tracks]. Thinning removes round((1 - density) n) of the n

@@ -72,6 +72,10 @@ constexpr std::array kRules{
         "goal: the goal in all three slots; path: two points on the recorded path, and the goal"),
     number_rule<&P::min_distance_to_goal_m, 0, 1000>(
         "least_way_m", "0 to 1000", "minimum distance to the goal in m; nearer road users follow the recording"),
+    number_rule<&P::max_first_turn_deg, 0, 180>(
+        "max_first_turn_deg", "0 to 180",
+        "maximum turn between a road user's first two recorded states; after a larger turn it starts with the second "
+        "heading; 0: any"),
     word_rule<&P::replay_experts, kYesNo>("replay_experts", "no, yes",
                                           "whether road users marked as expert are replayed"),
     number_rule<&P::rollouts, 1, 1000>("rollouts", "1 to 1000",

@@ -31,6 +31,9 @@ struct SceneProtocol {
   float box_scale = 1;                            // factor on the length and width of all boxes
   // Minimum distance from the start to the goal; a road user that starts nearer follows the recording. 0: no minimum.
   float min_distance_to_goal_m = 2;
+  // Maximum turn between a road user's first two recorded states. After a larger turn, the road user starts with the
+  // second heading, because the first heading contradicts its motion. 0: any turn.
+  float max_first_turn_deg = 0;
   bool replay_experts = false;  // whether road users that the scene file marks as experts follow the recording
   // Maximum number of driven road users per scene; 0: no limit. The self-driving car has priority, then the order of
   // the scene file.

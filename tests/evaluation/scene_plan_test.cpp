@@ -88,6 +88,30 @@ TEST(SceneProtocols, ThinTheSameRoadUsersForASeed) {
   }
 }
 
+TEST(SceneProtocols, ReplaceFirstHeadingsThatNoMotionExplains) {
+  const auto scene = crossing();
+  const auto first_heading_deg = [&](const char* protocol_name, float max_deg, float turn_deg) {
+    SceneProtocol protocol = scene_protocol(protocol_name);
+    protocol.max_first_turn_deg = max_deg;
+    Scenario turned = *scene;
+    const auto index = static_cast<size_t>(turned.sdc_track * turned.num_steps + protocol.start_step);
+    const float recorded_rad = turned.states[index].heading_rad;
+    turned.states[index + 1].heading_rad = recorded_rad;
+    turned.states[index].heading_rad = wrap_angle(recorded_rad + turn_deg * kPi / 180);
+    const auto adapted = protocol_scene(turned, protocol);
+    EXPECT_EQ(adapted->states[index + 1].heading_rad, recorded_rad);
+    return wrap_angle(adapted->states[index].heading_rad - recorded_rad) * 180 / kPi;
+  };
+  for (const char* name : {"womd", "waymax"}) {  // from the first step on, and from a later one
+    SCOPED_TRACE(name);
+    EXPECT_NEAR(first_heading_deg(name, 0, 120), 120, 1e-3) << "as recorded by default";
+    EXPECT_NEAR(first_heading_deg(name, 10, -8), -8, 1e-3);
+    EXPECT_EQ(first_heading_deg(name, 10, -12), 0);
+    EXPECT_EQ(first_heading_deg(name, 10, 179), 0);
+    EXPECT_NEAR(first_heading_deg(name, 10, 355), -5, 1e-3);
+  }
+}
+
 class ScenePlans : public ::testing::Test {
  protected:
   ScenePlan plan(const SceneProtocol& protocol, double density = 1) const {
