@@ -84,8 +84,8 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
         checkpoint: File of a policy; '' with `controller`, which then drives in the paper's world.
         maps: Names, files, or ranges such as procedural:1-64.
         controller: Driver instead of the policy: 'lane', 'idm_lanes', 'random', 'idle', or a function. The function gets a
-            dict of NumPy arrays [slots, ...] like pictura.Simulator.observations, and returns actions int [slots], on the
-            CPU. If cameras are given (rig, or width_px and height_px), the dict also contains images: `rgb` uint8 [slots,
+            dict of NumPy arrays [slots, ...] like pictura.Simulator.observations, and returns actions int [slots], or
+            logits [slots, 12] and values [slots], on the CPU. If cameras are given (rig, or width_px and height_px), the dict also contains images: `rgb` uint8 [slots,
             cameras, 3, height, width], black for inactive agents, or rgb_0, rgb_1, ... for cameras of several sizes.
         densities: 'light', 'medium' and 'dense': 60, 120 and 150 agents per world.
         agents_per_world: Number of agents per world instead of the densities' numbers; 0: as in `densities`.
@@ -225,7 +225,9 @@ def probe_removal(policies: collections.abc.Sequence[str | collections.abc.Calla
     A case is one removal of a road user (the user) for one observing agent (the ego) in one state. Returns a dict with the
     contents of the command's summary.json (docs/explanation/probes.md).
     
-    policies: checkpoints or safetensors. The world is that of the first policy's training.
+    policies: checkpoints, safetensors, or functions as in evaluate(), on the CPU. The world is that of the first policy's
+    training, or the paper's world if the first policy is a function. A function that returns actions brakes with probability
+    0 or 1 and has no values (None). `replay` and the control 'untrained' need saved policies.
     scenes: number of driven scenarios, which are divided equally among the policies. 0: the same number for each map and
     policy, at least two per map.
     sample_steps: steps between sampled states.
