@@ -10,7 +10,7 @@
 namespace pictura::gl {
 
 /// Bounds on the ratio of the depth of a strip's corner to the depth of FaceInstance::compared_plane at the same screen
-/// point. The minimum represents a practically infinite distance, beyond the plane's horizon. The maximum is the CPU
+/// point. The minimum represents a practically infinite depth of the plane, beyond its horizon. The maximum is the CPU
 /// renderer's limit for small depths.
 constexpr float kMinInverseDepth = 1e-4f, kMaxInverseDepth = kWidenedDepth;
 

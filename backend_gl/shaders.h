@@ -26,13 +26,13 @@ void main() {
   // A strip of two triangles covers the quadrilateral.
   vec3 p = gl_VertexID == 0 ? corner0 : gl_VertexID == 1 ? corner1 : gl_VertexID == 2 ? corner3 : corner2;
   vec2 at = projection.xy * p.xy + projection.zw * p.z;  // on screen, times depth
-  // Points behind the near plane have no position on screen. The corners that clipping creates instead are so far below
-  // the horizon that rounding them tilts the plane negligibly.
+  // Points behind the near plane have no position on screen. Clipping instead creates corners so far below the horizon
+  // that rounding them tilts the plane negligibly.
   if (p.z >= near_m) {
     at = round(at / p.z * positions) / positions * p.z;
     p.xy = (at - projection.zw * p.z) / projection.xy;
   }
-  // The ratio of its depth to the compared one.
+  // The ratio of the corner's depth to that of the compared plane.
   float nearer = compared_plane == vec3(0.0) ? 1.0 : clamp(dot(compared_plane, p), inverse_depth.x, inverse_depth.y);
   // Inverse depth: 1 at the near plane, 0 infinitely far.
   gl_Position = vec4(at, near_m * nearer, p.z);

@@ -1,5 +1,5 @@
-// Measures the time of drawing random agents of random steps from a scene history, and of drawing agents of the current
-// scene. Also checks that images from the history equal the images that were drawn during the step.
+// Measures the time of drawing views of random agents: of random steps of a scene history, and of the current scene.
+// Also checks that images from the history equal the images that were drawn during the step.
 #pragma once
 
 #include <string>
@@ -29,10 +29,10 @@ struct HistoryMeasurement {
   double history_bytes = 0;
 };
 
-/// Measures both kinds of calls. A call for the current scene draws num_views random agents of the last step. A call
-/// for the history gathers and draws num_views random pairs of a step and an agent. Neither call draws absent agents.
-/// Throws Error if an image from the history differs in any value from the image that was drawn during the step, or if
-/// a backend cannot run on this machine.
+/// Measures both kinds of calls. A call for the current scene draws the views of num_views random agents of the last
+/// step. A call for the history gathers and draws num_views random pairs of a step and an agent. Neither call draws
+/// absent agents. Throws Error if an image from the history differs in any value from the image that was drawn during
+/// the step, or if a backend cannot run on this machine.
 HistoryMeasurement measure_history(const HistoryCase& history_case);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Timing of renderers on scenes in their own memory space. Before and after timing, their images are compared with
-// those of the oracle (the CPU renderer).
+// Timing of renderers on scenes in the renderers' own memory space. Before and after timing, their images are compared
+// with those of the oracle (the CPU renderer).
 #pragma once
 
 #include <memory>
@@ -29,7 +29,7 @@ struct RenderCase {
 struct RenderMeasurement {
   std::string choice;           // as reported by make_renderer()
   std::vector<double> call_ms;  // mean of the calls of each repeat
-  ImageError error;             // errors against the oracle of the checked views, before and after timing
+  ImageError error;             // errors of the checked views against the oracle, before and after timing
   // If measures_memory is true: used device memory after the upload of the maps, and its peak. Both exclude the scene,
   // views and images.
   double up_front_bytes = 0, max_bytes = 0, image_bytes = 0;

@@ -10,8 +10,8 @@
 
 namespace pictura {
 
-/// Makes a target on the device, which measures time with events on the stream. This time includes the device's waits
-/// for the host between launches.
+/// Makes a device target that measures time with events on the stream. This time includes the device's waits for the
+/// host between launches.
 std::unique_ptr<RenderTarget> make_device_target(const DrivenWorlds& worlds, const RenderCase& render_case);
 
 /// Measures the device memory that all processes together have allocated since construction. A thread polls

@@ -53,9 +53,9 @@ struct SoakResult {
 /// the renderer was chosen to choice_out.
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const RendererConfig&, std::string* choice_out)>;
 
-/// Compares scene by scene, and calls on_scene(result so far) after each scene. Throws an Error that names the scene if
-/// making a renderer or drawing fails. This happens with `gl`, which supports no planes, halves or visibility. Throws
-/// the UsageErrors of `make` unchanged.
+/// Compares scene by scene, and calls on_scene(result so far) after each scene. If a renderer cannot be made or drawing
+/// fails, throws an Error that names the scene. This happens with `gl`, which supports no planes, halves or visibility.
+/// Throws the UsageErrors of `make` unchanged.
 SoakResult soak(const SoakOptions& options, const MakeRenderer& make,
                 const std::function<void(const SoakResult&)>& on_scene);
 

@@ -154,7 +154,7 @@ struct OptionsFunction {
   std::vector<std::string> required;
 
   /// Returns the text for Python's help(): a signature in the style of pybind11, such as "(config: str, *, minutes:
-  /// float = 0.0) -> dict", and `doc`. `first` are the parameters before the options.
+  /// float = 0.0) -> dict", and `doc`. `first` lists the parameters before the options.
   template <typename Options>
   std::string help(const std::string& first, const std::string& result, const std::string& doc) const {
     Options defaults;

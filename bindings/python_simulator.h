@@ -353,7 +353,7 @@ class PySimulator {
     for (const int32_t action : indices) commands.push_back({.action = action});
     return watched_step(std::move(commands));
   }
-  /// Takes a step with observers: first waits until they are ready (^C ends this wait), and notifies them of the step.
+  /// Takes a step with observers: waits until they are ready (^C ends this wait), then calls step_observed().
   StepResult watched_step(std::vector<Command> commands) {
     const std::vector<std::shared_ptr<StepObserver>> watching = watchers();
     for (const auto& watcher : watching) {

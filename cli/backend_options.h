@@ -13,7 +13,7 @@ namespace pictura {
 /// Returns a validator that accepts only these names. Its error message lists them.
 CLI::Validator one_of(const std::vector<std::string>& names);
 
-/// Adds --simulator, --renderer (or --backend) and --samples. Their help describes the default as `otherwise`.
+/// Adds --simulator, --renderer (or --backend) and --samples. Their help gives `otherwise` as the default.
 void add_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out);
 
 /// Adds the options of add_backend_options(), and --device for the policy's device.

@@ -68,9 +68,8 @@ class Renderer {
   /// renderer may keep the memory for later uploads.
   virtual void release(GeometryHandle handle, Stream stream = {}) = 0;
 
-  /// Allocates the memory for calls with up to max_views views, and with scenes of up to max_boxes boxes in all worlds
-  /// together, on the maps uploaded so far. May wait for the device. Renderers on the host allocate during drawing
-  /// instead.
+  /// Allocates the memory for calls with up to max_views views and, over all worlds, up to max_boxes boxes, given the
+  /// maps uploaded so far. May wait for the device. Renderers on the host allocate during drawing instead.
   virtual void reserve(int /*max_views*/, int /*max_boxes*/) {}
   /// Counter of events that invalidate captured graphs: the renderer's memory moved, or a map larger than all earlier
   /// maps was uploaded. Always 0 on the host.

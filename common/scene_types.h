@@ -107,8 +107,8 @@ enum Hides : uint32_t {
   kHidesLights = 2,  // all traffic lights
 };
 
-/// Key of the random numbers that randomize a view's cameras (common/raster/randomize_camera.h). The members have the
-/// meaning of those of RandomKey (common/rng.h). An image that is drawn again with the same key has the same bits.
+/// Key of the random numbers that randomize a view's cameras (common/raster/randomize_camera.h). The members mean the
+/// same as in RandomKey (common/rng.h). An image that is drawn again with the same key has the same bits.
 struct ViewKey {
   uint32_t world = 0;  // global id
   uint32_t agent = 0;  // index in its world, below RandomKey::kMaxAgents

@@ -31,10 +31,10 @@ struct Config {
   bool reads_images() const { return policy.modality == Modality::perspective; }
 };
 
-/// Reads a TOML text. `overrides` have the form "section.key=value" and take precedence. "section.key=" removes the
-/// text's value. "render.rig=..." also removes the text's image sizes. Whole numbers may be written in any decimal
-/// notation. run.backend is the old name of simulator.backend and render.backend; it sets each of the two keys that is
-/// absent. Throws Error, which names source:line and key, for unknown keys, wrong types, values out of range,
+/// Reads a TOML text. `overrides` have the form "section.key=value" and take precedence. "section.key=" removes the key
+/// from the TOML text. "render.rig=..." also removes the text's image sizes. Whole numbers may be written in any
+/// decimal notation. run.backend is the old name of simulator.backend and render.backend; it sets each of the two keys
+/// that is absent. Throws Error, which names source:line and key, for unknown keys, wrong types, values out of range,
 /// contradictions, and unknown backends.
 Config parse_config(const std::string& text, const std::string& source, const std::vector<std::string>& overrides = {});
 

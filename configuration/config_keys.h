@@ -1,4 +1,4 @@
-// Descriptions of a configuration's keys for documents, notices about settings, and absolute paths.
+// Descriptions of a configuration's keys for documents. Also notices about settings, and absolute paths.
 #pragma once
 
 #include <string>

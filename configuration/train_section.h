@@ -72,7 +72,7 @@ struct TrainSection {
   /// memory.
   std::string images = "auto";
   std::string graphs = "auto";                   // use of CUDA graphs for learning: auto or off
-  HaltedSlots halted_slots = HaltedSlots::skip;  // draw is only for measurements: every slot at every step
+  HaltedSlots halted_slots = HaltedSlots::skip;  // draw is only for measurements; it draws every slot at every step
 };
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// An owning Cairo surface with colours and text. Private to the drawing library.
+// Owner of a Cairo surface, with functions for colours and text. Private to the drawing library.
 #pragma once
 
 #include <memory>

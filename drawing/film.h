@@ -20,7 +20,7 @@ struct FilmOptions {
 };
 
 /// Settings for a film's pictures from a policy's cameras. Each picture is as wide as the film's columns. The minimum
-/// width of lines is scaled with the image, so that a line covers the same share of the picture as of the policy's
+/// width of lines is scaled with the image, so that a line covers equal shares of the picture and of the policy's
 /// image.
 RendererConfig film_view(const RendererConfig& trained_view);
 

@@ -1,5 +1,5 @@
-// Details of a picture of a map from above, except for surfaces and paint: lane directions, lights with the angles
-// within which their heads are visible, signs, building lines and names. Private to the drawing library.
+// Details over the surfaces and paint in a picture of a map from above: lane directions, lights with the angles within
+// which their heads are visible, signs, building lines and names. Private to the drawing library.
 #pragma once
 
 #include "pictura/drawing/map_layers.h"

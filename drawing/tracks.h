@@ -11,7 +11,7 @@ constexpr Rgb kSdcInk = hex(0x0B6E4F), kUnknownTrackInk = hex(0x6B7178);
 /// Colour of a track of this type.
 Rgb track_color(TrackType type);
 
-/// Paints every track as a line through its valid states, interrupted at gaps, and the stop lines of recorded lights.
+/// Paints the stop lines of recorded lights, and every track as a line through its valid states, interrupted at gaps.
 void paint_paths(const Scenario& scenario, Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m);
 
 /// Paints the boxes of all tracks whose state is valid at a step of the scenario.

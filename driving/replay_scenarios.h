@@ -16,8 +16,8 @@ struct ScenarioPlace {
 };
 
 /// Returns the `count` worst scenarios (or all if there are fewer), the worst first. A scenario is worse if a larger
-/// share of its vehicles has an infraction at fault. Among equal shares, it is worse with a larger share of collisions
-/// at fault, then with less distance driven.
+/// share of its vehicles has an infraction at fault. If these shares are equal, a larger share of collisions at fault
+/// is worse, and then a shorter distance driven.
 std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int count);
 
 /// A scenario to simulate again.
@@ -42,12 +42,12 @@ struct RecordedTakeover {
 Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& scenario,
                        const RecordingOptions& recording, ScenarioCounts* counts_out);
 
-/// Simulates a scenario again on the host, and records it from the takeover on. The recording ends with the takeover,
-/// or with an infraction of its agent. Throws Error if the scenario ends before the takeover.
+/// Simulates a scenario again on the host, and records it from the takeover on. The recording ends after the takeover's
+/// steps, or with an infraction of its agent. Throws Error if the scenario ends before the takeover.
 Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& scenario,
                        const RecordedTakeover& takeover, const RecordingOptions& recording);
 
-/// Writes replays of the `count` worst scenarios into a folder with a gallery, with record_scenario(). Reports on
+/// Uses record_scenario() to write replays of the `count` worst scenarios into a folder with a gallery. Reports on
 /// stderr the files, and any counts that differ from the evaluation's.
 void write_scenario_replays(const EvaluateOptions& options, const EvaluationResults& results,
                             const RecordingOptions& recording, int count, const std::string& folder);

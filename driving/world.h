@@ -72,9 +72,9 @@ struct DrivenWorld {
 /// evaluations. `policy` is the driver: a controller of host_controller_names(), or the path of a checkpoint. A
 /// checkpoint's policy takes its most likely actions. In a recorded scene, the driver drives the controlled tracks that
 /// are present at the start, and all other tracks follow the recording. With the controller "log", all tracks follow
-/// the recording. For a checkpoint, walls, population, observations and images are those of the policy's training
-/// unless the options override them, and the conditioning is that of evaluations. Throws UsageError for a simulator
-/// that does not use host memory.
+/// the recording. If `policy` is a checkpoint, then walls, population, observations and images are those of its
+/// training unless the options override them, and the conditioning is that of evaluations. Throws UsageError for a
+/// simulator that does not use host memory.
 DrivenWorld make_world(const WorldOptions& options, const std::string& policy);
 
 }  // namespace pictura

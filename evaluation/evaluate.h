@@ -21,7 +21,7 @@ constexpr std::array<int, 3> kDensityAgents{60, 120, 150};
 /// Returns the density of this name. Throws UsageError listing the names.
 Density density_named(const std::string& name);
 
-/// Global number of the first evaluation world. Training numbers its worlds from 0 and never reaches this number.
+/// Global number of the first evaluation world. The numbers of training worlds begin at 0 and never reach this number.
 constexpr uint32_t kFirstEvaluationWorld = 0x80000000u;
 
 /// Observes the worlds of an evaluation during driving. All batches of worlds run in the same simulator object.

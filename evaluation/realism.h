@@ -55,8 +55,7 @@ struct SceneRealism {
   double recorded_collision_rate = 0, recorded_off_road_rate = 0, recorded_red_light_rate = 0;
   // short_time_to_collision: share of steps with a time to collision below kShortTimeToCollision_s. comfort: share of
   // vehicles within all bounds of comfort. Both cover the scored vehicles of all rollouts, or of the recording.
-  // progress: mean over vehicles of the share of the recorded path up to the point nearest to the vehicle's final
-  // position.
+  // progress: share of the recorded path before the point nearest to the vehicle's final position; mean over vehicles.
   double short_time_to_collision = 0, recorded_short_time_to_collision = 0;
   double comfort = 0, recorded_comfort = 0;
   double progress = 0;
@@ -66,8 +65,8 @@ constexpr double kShortTimeToCollision_s = 0.95;
 /// A recorded scene, prepared for scoring.
 class RealismScene {
  public:
-  /// Throws Error naming the scene if it has no step after kRealismStart, a time step other than 0.1 s, or no road user
-  /// to score. The scored road users are the self-driving car and the tracks to predict, if they are present at
+  /// Throws Error naming the scene if it has no step after kRealismStart or no road user to score, or if its time step
+  /// is not 0.1 s. The scored road users are the self-driving car and the tracks to predict, if they are present at
   /// kRealismStart. If the scene lists no tracks to predict, all present road users are scored.
   explicit RealismScene(std::shared_ptr<const Scenario> scenario);
 

@@ -72,8 +72,8 @@ class RealismRoad {
   double edge_distance_m(const RealismObject& object, const RealismPose& pose) const;
   /// Returns whether the middle of a box's front crosses a stop line between two poses, in the line's direction of
   /// travel, while the line's light is red. The recording at `step` defines the lights. If the box crosses several
-  /// lines in one step, all their lights must be red. A line is ignored if the box is over 2 m above or below it, or
-  /// heads over 45 degrees away from the line's direction.
+  /// lines in one step, all their lights must be red. A line is ignored if the box is more than 2 m above or below it,
+  /// or heads more than 45 degrees away from the line's direction.
   bool runs_red_light(const RealismObject& object, const RealismPose& from, const RealismPose& to, int32_t step) const;
 
  private:

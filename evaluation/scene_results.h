@@ -78,7 +78,7 @@ struct SceneAgent {
 /// Adds a road user to its scene's counts. Road users that are not vehicles add only their driven steps.
 void add(const SceneAgent& agent, bool is_vehicle, SceneCounts* counts_inout);
 
-/// Results of one density over vehicle episodes; intervals are over scenes.
+/// Results of one density over vehicle episodes, with confidence intervals over scenes.
 struct SceneRow {
   double density = 1;
   int scenes = 0;

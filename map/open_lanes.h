@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// Minimum length of the longest route from the start of an open lane.
+/// A lane is open only if the longest route from its start has at least this length.
 constexpr float kMinOpenWay_m = 20.0f;
 
 /// Whether an endless route starts on any lane outside junctions. If so, agents drive only on endless lanes.

@@ -90,8 +90,8 @@ class SampleBudget {
 /// breaks. At a break, either formula may determine the curve's value.
 struct CurveBreaks {
   std::vector<double> s;
-  // Upper bounds of the second derivatives with respect to s of the position and of half the width. There is one bound
-  // for each interval between two breaks, infinite if unknown. An empty vector means that all are unknown.
+  // Upper bounds of the second derivatives, with respect to s, of the position and of half the width. There is one
+  // bound for each interval between two breaks, infinite if unknown. An empty vector means that all are unknown.
   std::vector<double> bend;
 };
 

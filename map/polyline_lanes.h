@@ -53,9 +53,9 @@ std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
 /// Finds junctions. Lanes of different roads become junction lanes if is_wanted accepts them and they cross anywhere
 /// except at their ends. All junction lanes, including those marked before the call, are assigned to new junctions.
 /// Lanes that cross, fork or merge belong to one junction, which has the name of the first lane's road. If bridged_m is
-/// positive (for roads that are cut into many lanes), a wanted lane of at most bridged_m between two junction lanes
-/// also becomes a junction lane, and junction lanes that follow each other belong to one junction. Calls
-/// count_work(steps) as it goes, so that the caller can limit the work that a file causes.
+/// positive (for roads that are cut into many lanes), there are two more rules: a wanted lane of at most bridged_m
+/// between two junction lanes also becomes a junction lane; and junction lanes that follow each other belong to one
+/// junction. Calls count_work(steps) as it goes, so that the caller can limit the work that a file causes.
 void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
                              const std::function<void(std::size_t)>& count_work, RoadMap* map);
 

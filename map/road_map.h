@@ -125,7 +125,7 @@ struct Junction {
   int32_t num_phases = 0;  // 0: no lights
 };
 
-/// A straight piece of the line behind the sidewalk along which walls of buildings may be placed.
+/// A straight piece of the line along which walls of buildings may be placed, behind the sidewalk.
 struct BuildingLine {
   Vec3 a_m, b_m;  // the road is on the right of a -> b
 };

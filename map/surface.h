@@ -83,7 +83,8 @@ class Surface {
   /// Bounds of the quads in the grid's cells, in the order of the grid's items, with one array per side. Queries test
   /// the bounds of eight quads at a time, and so exclude most quads of a cell.
   struct ItemBounds {
-    static constexpr std::size_t kPadding = 7;  // bounds are read eight at a time, also from the last item
+    static constexpr std::size_t kPadding =
+        7;  // bounds are read eight at a time, even if the first of them is the last item
     std::vector<float> low_x, high_x, low_y, high_y, low_z, high_z;
 
     void reserve(std::size_t count);

@@ -1,6 +1,6 @@
 // Splits a batch into chunks that pass through the network one after the other. All chunks of a batch have the same
-// size. On a device, sizes are rounded so that only few different sizes occur, although the number of active agents
-// varies. So cuDNN's plans and CUDA graphs, which depend on the size, are rarely rebuilt.
+// size. On a device, sizes are rounded so that few different sizes occur, although the number of active agents varies.
+// So cuDNN's plans and CUDA graphs, which depend on the size, are rarely rebuilt.
 #pragma once
 
 #include <algorithm>

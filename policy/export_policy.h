@@ -32,7 +32,8 @@ struct ExportOptions {
 /// Reads a policy from a checkpoint or a safetensors file and writes it to `out` as write_policy() does. With
 /// options.size, patches and the minimum width of drawn lines become k times as large, and the first convolution is
 /// spread over the larger patches (policy/patch_spread.h). Throws Error, which names the file, if a file cannot be read
-/// or written, or contains no average. Throws UsageError, which names `size`, if the policy cannot have that size.
+/// or written, or has no average although options.average is set. Throws UsageError, which names `size`, if the policy
+/// cannot have that size.
 ExportedPolicy export_policy(const std::string& policy_path, const std::string& out, const ExportOptions& options);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Pretrained image network that replaces a policy's convolutions: a file of scripts/export_backbone, which contains a
-// TorchScript program and its description.
+// Pretrained image network that replaces a policy's convolutions: a TorchScript program and its description, in a file
+// that scripts/export_backbone wrote.
 #pragma once
 
 #include <memory>

@@ -52,8 +52,8 @@ at::Tensor feature_rows(const at::Tensor& rows, const RowFeatures& features, boo
 
 /// Converts images to patches, without gradient. images: u8 [views, cameras, 3, height, width], padded with black to
 /// whole patches; result: [cameras * views, channels, height / patch_px, width / patch_px] of `type`, with channels
-/// last in memory. Color c (0 to 255) of pixel (x, y) of a patch becomes channel (c * patch_px + y) * patch_px + x;
-/// further channels are 0.
+/// last in memory. The value (0 to 255) of color c of pixel (x, y) of a patch becomes channel (c * patch_px + y) *
+/// patch_px + x; further channels are 0.
 at::Tensor image_patches(const at::Tensor& images, int64_t patch_px, at::ScalarType type);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Sizes that both the policy's layers and the estimate of their memory use.
+// Sizes for both the policy's layers and the estimate of their memory.
 #pragma once
 
 #include <string_view>

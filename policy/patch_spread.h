@@ -15,10 +15,10 @@ inline constexpr const char* kFirstConvolution = "conv.0.weight";
 /// Returns the side in px of the patches that a first convolution with this number of input channels reads.
 int patch_side_px(int64_t channels);
 
-/// Returns the weight for patches of k p px, where `weight`, [out, 3 p^2, kernel, kernel], is for patches of p px and k
-/// is `factor`. The weight of color c of pixel (x, y) is divided by k^2 and stored for the pixels (k x + i, k y + j),
-/// i, j < k. If an image is constant in blocks of k x k px, the new features equal those of `weight` for the image with
-/// one pixel per block.
+/// Converts `weight`, [out, 3 p^2, kernel, kernel], from patches of p px to patches of k p px, where k is `factor`. The
+/// weight of color c of pixel (x, y) is divided by k^2 and stored for the pixels (k x + i, k y + j), i, j < k. If an
+/// image is constant in blocks of k x k px, the new features equal those of `weight` for the image with one pixel per
+/// block.
 StoredTensor spread_over_patches(const StoredTensor& weight, int factor);
 
 /// Variant of spread_over_patches() without the division by k^2. It computes Adam's moments of spread weights from

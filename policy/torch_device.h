@@ -35,7 +35,7 @@ struct DeviceMemory {
 };
 DeviceMemory memory_of(Device device);
 
-/// Returns the memory available to the network: on a device, the memory that is free without torch's cache; on the
+/// Returns the memory available to the network: on a device, the free memory after release of torch's cache; on the
 /// host, all memory.
 int64_t available_bytes(Device device);
 

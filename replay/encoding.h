@@ -20,8 +20,7 @@ class NumberReader {
  public:
   explicit NumberReader(std::string_view bytes) : bytes_(bytes) {}
   int32_t next();
-  /// Reads a number of items. Throws Error if it exceeds the remaining bytes, because each item takes at least one
-  /// byte.
+  /// Reads a count of items. Throws Error if it exceeds the remaining bytes, because each item takes at least one byte.
   int32_t next_count();
   bool is_at_end() const { return at_ == bytes_.size(); }
 

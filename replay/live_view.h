@@ -18,7 +18,7 @@ namespace pictura {
 
 struct LiveViewOptions {
   int port = 0;  // 0: any free port
-  // If set, the view listens on all addresses, for pages that use this name of the machine.
+  // If set, the view listens on all addresses, and accepts requests to this name of the machine.
   std::string host_name;
   int watched = 0;             // agent whose decisions and images pages receive at first
   RendererConfig cameras;      // cameras of every agent

@@ -1,4 +1,4 @@
-// Records one world of a simulator, in host memory, step by step.
+// Records one world of a simulator that uses host memory, step by step.
 #pragma once
 
 #include <memory>

@@ -38,7 +38,7 @@ class LiveServer {
   /// Returns the URL of the page, which contains a secret.
   const std::string& address() const;
 
-  /// Sends an event to all pages that have received the initial events and read fast enough. Calls `message`, which
+  /// Sends an event to all pages that have received the initial events and are not too slow. Calls `message`, which
   /// returns the event's data, only if there is such a page. Never waits.
   void send(std::string_view event, const std::function<LiveJson()>& message);
   /// Whether any page needs send_initial_events(). A new page needs it, and so does a page that was too slow and has

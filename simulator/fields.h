@@ -78,7 +78,7 @@ constexpr int kNumWaypoints = 3;
   X(goal_lane, int32_t, 1, -1, "lane (or piece of a walkway) of the last waypoint, where the next chain starts") \
   X(goal_lane_s_m, float, 1, 0, "arc length of the last waypoint on it")                                         \
   X(goal_chains, int32_t, 1, 0, "chains drawn in this episode")                                                  \
-  X(goal_x_m, float, 1, 0, "last waypoint that the metric Goals waits for, see rules/step.h")                    \
+  X(goal_x_m, float, 1, 0, "last waypoint of a chain, for the metric Goals; see rules/step.h")                   \
   X(goal_y_m, float, 1, 0, "")                                                                                   \
   X(goal_z_m, float, 1, 0, "")                                                                                   \
   X(goal_open, uint8_t, 1, 0, "1 while the metric waits for it")                                                 \
@@ -91,7 +91,7 @@ constexpr int kNumWaypoints = 3;
   X(goals_reached, int32_t, 1, 0, "last waypoints passed within 2 m in this episode")                            \
   X(waypoints_reached, int32_t, 1, 0, "waypoints of any kind, passed or rewarded in this episode")               \
   X(distance_m, float, 1, 0, "sum of |speed| dt in this episode")                                                \
-  X(first_motion_step, int32_t, 1, 0, "first step of this episode above kRest_mps, from 1; 0: none yet")         \
+  X(first_motion_step, int32_t, 1, 0, "first step (from 1) of this episode above kRest_mps; 0: none yet")        \
   X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                          \
   X(episode_return, float, 1, 0, "sum of rewards in this episode")
 

@@ -20,8 +20,8 @@ constexpr int kWaypointFeatures = 3;
 enum class EntitySet : int32_t { partners, lanes, boundaries, controls, walls };
 constexpr int kNumEntitySets = 5;
 
-/// Condition for the presence of an array: `own` arrays are always present, `sets` with
-/// SimulatorConfig::vector_observations, and `walls` if SimulatorConfig::wall_observations is set too.
+/// Condition for the presence of an array: `own` arrays are always present, `sets` need
+/// SimulatorConfig::vector_observations, and `walls` also need SimulatorConfig::wall_observations.
 enum class ObservationPart : uint8_t { own, sets, walls };
 
 // X(name, type, rows, features, part, comment): the arrays of an observation, [slots, rows, features]. Simulators,

@@ -33,8 +33,8 @@ std::vector<std::shared_ptr<const SavedWorld>> extract_worlds(const Simulator& s
                                                               const std::vector<size_t>& worlds);
 
 /// Returns a state for simulator.restore() in which world i has the state worlds[i]. The saved worlds may come from
-/// simulators with other observations or other walls. Throws Error if a saved world does not fit the simulator's world:
-/// map, number of agents, id, boxes or lights.
+/// simulators with other observations or other walls. Throws Error if a saved world differs from the simulator's world
+/// in map, number of agents, id, or number of boxes or lights.
 std::vector<uint8_t> saved_state_of(const Simulator& simulator, const std::vector<const SavedWorld*>& worlds);
 
 }  // namespace pictura

@@ -35,8 +35,8 @@ struct SceneProtocol {
   // second heading, because the first heading contradicts its motion. 0: any turn.
   float max_first_turn_deg = 0;
   bool replay_experts = false;  // whether road users that the scene file marks as experts follow the recording
-  // Maximum number of driven road users per scene; 0: no limit. The self-driving car has priority, then the order of
-  // the scene file.
+  // Maximum number of driven road users per scene; 0: no limit. The self-driving car comes first, then the others in
+  // the order of the scene file.
   int max_driven = 0;
   // Role of road users whose initial box touches another box or the road's edge, or is off the road.
   Overlapping overlapping = Overlapping::replay;

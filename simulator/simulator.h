@@ -145,8 +145,8 @@ struct SpawnReport {
 ///
 /// A simulator on a CUDA device makes that device current in each call and restores the caller's device. Its calls put
 /// work on a stream and share the simulator's memory: issue them on one stream, or make each call wait for the previous
-/// one. There, invalid commands are found only on the device, which stores the error; poll(), check() or the next call
-/// throws it.
+/// one. Invalid commands are found only on the device, which stores the error; poll(), check() or the next call throws
+/// it.
 class Simulator {
  public:
   virtual ~Simulator() = default;
@@ -181,7 +181,7 @@ class Simulator {
   uint64_t generation() const { return generation_; }
 
   /// Replaces the worlds and maps, and starts the first episodes of `seed`. The result is bit for bit that of a new
-  /// simulator with this configuration, seed, maps and worlds. handles: [maps], or empty for 0, 1, ... Memory is
+  /// simulator with this configuration, seed, maps and worlds. handles: [maps]; empty means 0, 1, and so on. Memory is
   /// reused: on a device, nothing is allocated if the capacity suffices, and maps that are already present are not
   /// copied again. Captured graphs and controllers of the previous worlds must no longer be used. May wait for the
   /// stream. Throws as make_simulator() does, and then leaves everything unchanged.
@@ -243,7 +243,7 @@ class Simulator {
   /// Hash of the agents' fields, the light states and the parked cars; equal on all executors.
   virtual uint64_t state_hash(Stream stream = {}) const = 0;
 
-  /// Save and restore the whole state as bytes, for exact resume. restore() throws Error if the bytes come from a
+  /// Save and restore the whole state as bytes, to resume exactly. restore() throws Error if the bytes come from a
   /// simulator with another configuration.
   virtual std::vector<uint8_t> save(Stream stream = {}) const = 0;
   virtual void restore(Span<const uint8_t> bytes, Stream stream = {}) = 0;

@@ -17,8 +17,8 @@ struct Walkways {
 };
 
 /// Makes the walkways of a map. Omits pieces on the drivable surface of `roads` (except on crosswalks), and connected
-/// networks whose total length is below kMinWalk_m. `roads` needs only its lanes and their cells. The result is empty
-/// if the map has no walkways.
+/// networks whose total length is below kMinWalk_m. Only the lanes of `roads` and their cells are read. The result is
+/// empty if the map has no walkways.
 Walkways make_walkways(const RoadMap& map, const MapView& roads);
 
 constexpr float kMinWalk_m = 40.0f;

@@ -50,10 +50,10 @@ class ChunkRunner {
 
   /// Sets the targets of subsequent losses.
   void set_targets(const Targets& targets);
-  /// Adds the gradient of this rank's part of a minibatch's loss to the parameters' gradients, which must be defined.
-  /// Computes it in chunks of at most forward_chunk rows. The time counts as Phase::learn and Phase::backward. Returns
-  /// the statistics of this rank's part, f64 [kNumLossStats], with 0 for the gradient norm. They are valid until the
-  /// next call.
+  /// Adds the gradient of the loss on this rank's part of a minibatch to the parameters' gradients, which must be
+  /// defined. Computes it in chunks of at most forward_chunk rows. The time counts as Phase::learn and Phase::backward.
+  /// Returns the statistics of this rank's part, f64 [kNumLossStats], with 0 for the gradient norm. They are valid
+  /// until the next call.
   at::Tensor add_gradients(const Minibatch& minibatch, int64_t forward_chunk, const LossFunction& loss);
   /// Returns the losses of one chunk, from which gradients can be computed. Uses no CUDA graphs. The time counts as
   /// Phase::diagnose.

@@ -10,8 +10,8 @@ namespace pictura {
 /// keeps images if they take at most two fifths of its `memory_bytes`.
 bool keeps_images(const Config& config, int num_agents, Device device, int64_t memory_bytes);
 
-/// Returns the number of images that a rollout of num_steps steps keeps of an agent that is always active. The agent
-/// selects an action every decision_steps steps; images of other steps are not kept.
+/// Returns how many images of an always active agent a rollout of num_steps steps keeps. The agent selects an action
+/// every decision_steps steps; images of other steps are not kept.
 constexpr int64_t num_kept_images(int64_t num_steps, int decision_steps) { return num_steps / decision_steps + 1; }
 
 /// Returns the estimated bytes of simulator, rollout and update for all agents of a configuration. Counts only memory
@@ -32,7 +32,7 @@ NetworkSize network_size(const Config& config, Device device);
 
 /// Throws Error if an estimate exceeds `memory_bytes` of the device. One estimate is for the network with a chunk of
 /// train.forward_chunk, another for the network and the agents. The error names the responsible settings, and the
-/// number of transitions or agents that would fit. With several ranks, the estimate is for the part of one rank.
+/// number of transitions or agents that would fit. With several ranks, both estimates are for one rank.
 void check_memory(const Config& config, Device device, int64_t memory_bytes, int num_ranks = 1);
 
 /// Estimated bytes of maps.

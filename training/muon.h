@@ -15,7 +15,7 @@ namespace pictura {
 bool is_stepped_by_muon(const NamedTensor& parameter);
 
 /// Root mean squares of the weights for which is_stepped_by_muon() is true, also in runs without Muon. all: over all
-/// these weights. largest: maximum over matrices. Both are 0 without such layers.
+/// these weights. largest: maximum over matrices. Both are 0 without such weights.
 struct WeightRms {
   double all = 0, largest = 0;
 };
@@ -23,7 +23,7 @@ struct WeightRms {
 WeightRms weight_rms(const std::vector<NamedTensor>& parameters);
 
 /// Returns matrices [n, rows, columns] with the singular vectors of `matrices` and singular values near 1. Computes
-/// them by five Newton-Schulz steps in `type`. Singular values of 1/200 of the Frobenius norm or more become 0.7 to
+/// them by five Newton-Schulz steps in `type`. Singular values of at least 1/200 of the Frobenius norm become 0.7 to
 /// 1.2. A zero matrix stays zero.
 at::Tensor orthogonalized(const at::Tensor& matrices, at::ScalarType type);
 

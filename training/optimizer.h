@@ -26,8 +26,8 @@ class Optimizer {
   const at::Tensor& gradients() const { return gradients_; }
   /// Sets the gradients to 0.
   void clear_gradients();
-  /// Allocates gradients of 0, which are parts of one vector. Backward passes add to them. Must be called after the
-  /// shape of a parameter changes.
+  /// Allocates gradients as parts of one vector, and sets them to 0. Backward passes add to them. Must be called after
+  /// the shape of a parameter changes.
   void allocate_gradients();
 
   /// AdamW's first moments and Muon's momentum, in the order of the policy's parameters.

@@ -15,11 +15,11 @@ namespace pictura {
 /// State of the advantage filter (rules/advantage_filter.h) across rollouts.
 struct AdvantageFilter {
   double average =
-      -1;  // average over rollouts of the largest |advantage|, or of a quantile of all |advantages|; negative at first
+      -1;  // average of each rollout's largest |advantage|, or of a quantile of its |advantages|; negative at first
 };
 
 /// Upper bounds of rounding differences between a rollout's log-probabilities and the learner's, before the first step.
-/// The first bounds the mean absolute difference, the second the share of ratios outside the clip range. Larger
+/// The first limits the mean absolute difference, the second limits the share of ratios outside the clip range. Larger
 /// differences cause the log-probabilities to be recomputed.
 constexpr double kMaxAbsLogRatio = 1e-3, kMaxClipFraction = 1e-3;
 

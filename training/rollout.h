@@ -12,7 +12,7 @@ namespace pictura {
 
 /// Observations of all slots at each step. Images of agents that select a new action are kept, or drawn again from
 /// stored scenes whenever they are read. Drawing again saves memory: the images of the paper's rollout would take 163
-/// GB, its scenes take 0.25 GB.
+/// GB, but the scenes take 0.25 GB.
 class RolloutObservations {
  public:
   /// Allocates train.num_steps + 1 steps of this simulator. The simulator, the renderer and the timer must outlive this
@@ -30,8 +30,8 @@ class RolloutObservations {
   void record(int64_t step, const at::Tensor& slots);
 
   /// Gathers the observations of rows. rows: i64 [batch] of step * slots + slot; the agents must have been active at
-  /// these steps. patch_px: side of the patches of images that are drawn again, as in draw_images()
-  /// (policy/observation.h).
+  /// these steps. patch_px: side of patches, as in draw_images() (policy/observation.h); applies only to images that
+  /// are drawn again.
   Observation gather(const at::Tensor& rows, int patch_px = 0) const;
 
   /// Whether images are kept when they are drawn.
@@ -65,7 +65,7 @@ class RolloutObservations {
 struct Rollout {
   RolloutObservations observations;         // num_steps + 1 steps; the last one follows the last action
   at::Tensor values;                        // f32 [num_steps + 1, num_slots]; 0 for agents that were not active
-  at::Tensor actions;                       // i32 [num_steps, num_slots], as everything below
+  at::Tensor actions;                       // i32 [num_steps, num_slots], the shape below where none is given
   at::Tensor log_probs;                     // f32, log-probabilities of `actions`
   at::Tensor rewards;                       // f32
   at::Tensor terminated, truncated, valid;  // u8, as StepResult defines them

@@ -23,7 +23,7 @@ struct Run {
   Run(const Config& config, Device device, Communicator* communicator = single_communicator(),
       std::unique_ptr<const Policy> policy = nullptr);
 
-  /// Calls `work`. If graphs are used, torch's current stream is then one that can be captured.
+  /// Calls `work`. If graphs are used, torch's current stream during the call is one that can be captured.
   void on_stream(const std::function<void()>& work) const;
 
   /// Copies the weights of another run. Throws Error naming the difference if the networks differ.

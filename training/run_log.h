@@ -16,7 +16,7 @@
 
 namespace pictura {
 
-/// CSV file of a run with a row per update. Of an existing file it keeps the rows that are complete and belong to
+/// CSV file of a run with a row per update. It keeps those rows of an existing file that are complete and belong to
 /// completed updates. A row is incomplete if the process was killed or the disk was full. A file with other columns is
 /// renamed to PATH.1 (or the next free number), with a notice.
 class ProgressCsv {
@@ -55,7 +55,7 @@ struct EvaluationRecord {
 class RunLog {
  public:
   /// Opens the files of a run that has completed `updates_done` updates with `agent_steps` agent-steps. If `folder` is
-  /// empty, it writes no files. Throws Error naming the path.
+  /// an empty text, the log writes no files. Throws Error naming the path.
   RunLog(const std::string& folder, const Config& config, int64_t updates_done, int64_t agent_steps,
          const std::vector<RecentUpdate>& recent, const std::function<void(const std::string&)>& on_notice);
 
@@ -85,7 +85,7 @@ class RunLog {
   std::optional<ProgressCsv> evaluation_csv_;  // only if the run evaluates
   double evaluation_s_ = 0;
   std::deque<RecentUpdate> recent_;
-  // Number of agent-steps at one time. The time excludes evaluations.
+  // A point in time, and the number of agent-steps until then. The time excludes evaluations.
   struct Moment {
     double s;
     int64_t agent_steps;

@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// Draws worlds that together have simulator.num_slots slots over all ranks. Their map indices refer to
+/// Chooses random worlds that together have simulator.num_slots slots over all ranks. Their map indices refer to
 /// training_maps(). Worlds of recorded scenes have simulator.max_agents agents each; SceneSets has their maps.
 std::vector<WorldSpec> draw_training_worlds(const Config& config);
 

@@ -1,6 +1,6 @@
 // Drawing of one image. It sets up the faces of all primitives that may be visible, rasterizes the faces into fragments
 // (the part of a pixel that one face covers), and composites each pixel. The rules of drawing are in common/raster,
-// which CUDA kernels share. ImageDrawer adds only the order of the work and the memory, which all images reuse.
+// which CUDA kernels share. ImageDrawer adds only the memory, which all images reuse, and the order of the work.
 #pragma once
 
 #include <functional>
@@ -21,7 +21,7 @@ struct ImageRequest {
   PinholeCamera camera;  // in the world
   float line_floor_px = 0;
   bool debug_palette = false;
-  bool culls_occluded = true;    // drop faces behind the boxes and walls that cover most of the image
+  bool culls_occluded = true;    // drop faces behind the boxes and walls that are largest in the image
   const Crowd* crowd = nullptr;  // sorted boxes of the view's world; null: every box is tested
 };
 

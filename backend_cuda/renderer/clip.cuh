@@ -20,7 +20,7 @@ constexpr int kLaneCorners = 8;
 struct ClipShared {
   Quad quad;  // quad of one lane, read by all lanes
   // Corners: each lane uses a column, or the whole warp uses the first row. There are two additional rows, because a
-  // cut and a kept corner may be written past the last row before the count is checked.
+  // cut point and a kept corner may be written past the last row before the count is checked.
   static constexpr int kRows = kLaneCorners + 2;
   float x[kRows][kWarpSize], y[kRows][kWarpSize], z[kRows][kWarpSize];
   uint16_t edges[kLaneCorners * kWarpSize];  // see LaneEdge

@@ -78,8 +78,8 @@ struct GridRows {
 };
 
 // Sets the outline: the four edges from the eye to the far corners, and the four edges between neighbouring corners. On
-// the ground plane, these edges include all sides of the outline's convex hull. Collective over all lanes of the warp,
-// one lane per side, for strips and for walls.
+// the ground plane, these edges include all sides of the outline's convex hull. Collective over all lanes of the warp;
+// strips and walls each have one lane per side.
 __device__ inline GridRows set_outline(CullShared* storage, const ImageSetting& setting,
                                        const DeviceGeometry& geometry) {
   const int side = lane_index() % kOutlineSides, of_walls = lane_index() / kOutlineSides & 1;
@@ -161,7 +161,7 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
                             of_walls != 0 ? row - rows.count[0] + rows.begin[1] : row + rows.begin[0]);
     }
     // The pieces of all rows are numbered consecutively, strips first. The offset of a non-empty row is the difference
-    // between a piece's index in the grid and this number.
+    // between a piece's index in the grid and its number.
     const bool has_some = range.count > 0;
     const int end = warp_inclusive_sum(range.count), begin = end - range.count;
     const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);

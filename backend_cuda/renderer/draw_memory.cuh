@@ -1,5 +1,5 @@
 // Memory layout of a block: in shared memory, or in global memory for blocks whose data does not fit there. Any
-// function of a kernel can obtain it.
+// function of a kernel can obtain the layout.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/block.cuh"

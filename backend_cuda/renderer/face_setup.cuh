@@ -154,7 +154,7 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   const bool is_visible = is_wanted && clip_class == ClipClass::inside && passes_culling,
              is_clipped = is_wanted && clip_class == ClipClass::crossing;
   // Two lanes allocate for the whole warp: one allocates faces, the other clipped entries. The results are needed only
-  // after the edges.
+  // after the edges are made.
   const unsigned visible = __ballot_sync(kAllLanes, is_visible), clipped = __ballot_sync(kAllLanes, is_clipped);
   const int lane = lane_index(), wanted = __popc(lane == 0 ? visible : (lane == 1 ? clipped : 0u));
   int32_t taken = 0;

@@ -15,10 +15,10 @@ __device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px
   return {x, min_of(x + columns, width_px), y, min_of(y + rows, y_end)};
 }
 
-/// Word of a pixel. While full faces are searched, the upper bits hold the largest occluder bound, as bits that sort
-/// like the bound. The lower bits hold the index of the bound's face plus 1. From the pixel's first fragment on, the
-/// upper bits hold the first fragment of its list, and the sign bit is set. The word is 0 if the pixel has neither a
-/// face nor a fragment.
+/// Word of a pixel. While fully covering faces are sought, the upper bits hold the largest occluder bound, as bits that
+/// sort like the bound. The lower bits hold the index of the bound's face plus 1. From the pixel's first fragment on,
+/// the upper bits hold the first fragment of its list, and the sign bit is set. The word is 0 if the pixel has neither
+/// a face nor a fragment.
 template <typename Word>
 struct PixelWord {
   static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
@@ -266,8 +266,8 @@ __device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wan
 
 // Makes all effective samples of a fragment visible initially. A fragment that covers its pixel fully may intersect the
 // pixel's full face, which then becomes a fragment too. Lists the pixels to be composited, whose fragments are not
-// alone (is_alone()). Records whether any pixel's remainder may have to be divided, because several fragments cover the
-// pixel fully and another fragment, which is no sliver, covers it partly. Hardly any pixel has such fragments.
+// alone (is_alone()). Records whether any pixel's remainder may have to be divided: if several fragments cover the
+// pixel fully and another one, no sliver, covers it partly. Hardly any pixel has such fragments.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;

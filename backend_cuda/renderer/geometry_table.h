@@ -1,4 +1,4 @@
-// Maps of a renderer in device memory, and the table by handle that kernels read.
+// A renderer's maps in device memory, and their table, which kernels index by handle.
 #pragma once
 
 #include <memory>

@@ -38,10 +38,10 @@ __device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
   if (!with_full) clear_visible_samples(memory, pair.b, occluded.of_b);
 }
 
-// Resolves occlusion between all pairs of fragments of a pixel, including its full face, except for pairs that can no
-// longer occlude each other. A lane takes a fragment and walks the rest of the list after it, one step at a time. At
-// the end of the list, the lane takes another fragment. Fragments that were made last come first, because their lists
-// are longest. Overlapping pairs are queued until every lane of the warp has one.
+// Resolves the occlusion of all pairs among a pixel's fragments and its full face, except for pairs that can no longer
+// occlude each other. A lane takes a fragment and walks the rest of the list after it, one step at a time. At the end
+// of the list, the lane takes another fragment. Fragments that were made last come first, because their lists are
+// longest. Overlapping pairs are queued until every lane of the warp has one.
 template <typename Memory>
 __device__ void resolve_occlusion(const Memory& memory, const Part& part, int count) {
   WarpQueue pairs(&memory.state->warps[warp_index()].queue);
@@ -253,8 +253,8 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
   return true;
 }
 
-// Plans the next part of a tile, after a part that was drawn or did not fit. Parts first become narrower, because
-// distant primitives are concentrated along the horizon, and then lower. Returns false if a single pixel does not fit.
+// Plans the next part of a tile, after a part that was drawn or did not fit. Parts first become narrower, then lower,
+// because distant primitives are concentrated along the horizon. Returns false if a single pixel does not fit.
 // Collective over all threads of the block.
 template <typename Memory>
 __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn) {

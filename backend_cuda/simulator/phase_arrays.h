@@ -59,7 +59,7 @@ struct PhaseArrays {
   int32_t* rejected_slot = nullptr;     // lowest slot with a command out of range, or kNoSlot
   int64_t* rejected_command = nullptr;  // first rejected command since the host checked, or kNoRejection
   int32_t* first_element = nullptr;     // [num_slots] first element of an edit for the slot, or kNoSlot
-  int32_t* faulty_element = nullptr;    // first element of the edit or the queries with a fault, or kNoSlot
+  int32_t* faulty_element = nullptr;    // first faulty element of the edit or the queries, or kNoSlot
   int64_t* faulty_edit = nullptr;       // first fault of an edit since the host checked, or kNoEditFault
   int64_t* faulty_query = nullptr;      // first fault of a query since the host checked, or kNoQueryFault
 

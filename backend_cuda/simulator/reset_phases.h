@@ -1,4 +1,4 @@
-// Phases that begin episodes. The first episode of a seed begins immediately; each next episode is prepared while the
+// Phases that begin episodes. The first episode of a seed begins immediately; each later episode is prepared while the
 // previous one continues.
 #pragma once
 

@@ -116,7 +116,7 @@ struct FinishStep {
     *arrays.rejected_command = rejected_command(*arrays.rejected_slot, commands[*arrays.rejected_slot]);
   }
 
-  /// Copies from the prepared next episode the boxes that belong to no agent, and the lights.
+  /// From the prepared next episode, copies the lights and the boxes that belong to no agent.
   template <typename ThreadGroup>
   PICTURA_HD void take_next(const ThreadGroup& group, int w) const {
     const WorldView world = arrays.world(w), next = arrays.next_world(w);
@@ -178,7 +178,7 @@ struct FinishStep {
   }
 };
 
-/// Phase that makes waiting agents enter a world with roads that end, after a step that did not end its episode.
+/// Phase that, on roads that end, makes waiting agents enter a world after a step that did not end its episode.
 struct EnterWaiting {
   PhaseArrays arrays;
   template <typename ThreadGroup>

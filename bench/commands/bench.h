@@ -27,8 +27,8 @@ std::string population_of_crowds();
 /// Adds the option --map, which accepts several maps. default_maps is the description of the default in the help.
 void add_maps_option(CLI::App* command, std::vector<std::string>* maps,
                      const std::string& default_maps = "Town01 where it is found, else procedural:1");
-/// Returns the maps that --map selects. `towns` selects all maps of the map folder, which must not be empty. No value
-/// selects the default.
+/// Returns the maps that --map selects. `towns` selects all maps of the map folder, which must not be empty. An empty
+/// list selects the default.
 std::vector<std::string> named_maps(const std::vector<std::string>& maps);
 
 /// Throws UsageError unless each backend is known.

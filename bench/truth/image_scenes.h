@@ -13,7 +13,7 @@ namespace pictura {
 void add_polyline(StaticGeometry* geometry, std::vector<Vec3> points_m, float width_m, StripKind kind);
 
 /// A scene with its views. make_synthetic_town() makes a random town: a grid of streets 60 m apart, crosswalks and
-/// lights at crossings, walls along blocks, and num_agents agents on the streets, which do not touch each other.
+/// lights at crossings, walls along blocks, and on the streets, num_agents agents that do not touch each other.
 struct Snapshot {
   StaticGeometry geometry;
   SceneOwner scene;  // one world with handle 0
@@ -47,7 +47,7 @@ Snapshot make_hill();
 /// both sides.
 Snapshot make_crash();
 
-/// Returns a rig of one camera, 1.5 m above the origin of the ego frame, which faces forward. Its numbers are round.
+/// Returns a rig of one camera that faces forward, 1.5 m above the origin of the ego frame. Its numbers are round.
 Rig simple_rig(int width_px = 100, int height_px = 100, float focal_px = 50);
 
 /// Returns a rig of the first camera of paper_rig().

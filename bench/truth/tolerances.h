@@ -18,7 +18,7 @@ constexpr double kSharedEdgeError = 3.0 / 255;
 /// and the visibility of each object has a resolution of 1/64.
 constexpr double kWorstOracleError = 16.0 / 255;
 /// Maximum share of pixels whose planes (depth, class, instance) show another surface than the truth. At such pixels,
-/// the centre is on an edge except for rounding, or strips of two levels cross and are ordered as a whole.
+/// the centre is on an edge within rounding errors, or strips of two levels cross and are ordered as a whole.
 constexpr double kPlaneShare = 1e-3;
 /// Maximum relative error of the depth plane at pixels where the truth has the same kind of surface.
 constexpr double kDepthError = 1e-3;
@@ -69,9 +69,9 @@ constexpr ImageTolerance kGoldenKernel{"kernel", kKernelWorstError, kKernelError
 constexpr ImageTolerance kGoldenTruth{"truth", kWorstOracleError, 1.0 / 255, 1, kMinOraclePsnr_db};
 /// Tolerance for images of a single pixel, in which dozens of objects share 64 samples and errors do not average out.
 constexpr ImageTolerance kGoldenTruthOnePixel{"truth, one pixel", 10.0 / 255, 1.0 / 255, 1, 0};
-/// Tolerance of the OpenGL renderer against the oracle's images. It takes kGoldenGlGrid squared samples per pixel, so
-/// that its error is below that of any fault that the test must detect. With Mesa's rasterizer, the PSNR is 52.3 dB and
-/// the largest error is 14/255. Other drivers use other sample positions and rounding.
+/// Tolerance of the OpenGL renderer against the oracle's images. The renderer takes kGoldenGlGrid^2 samples per pixel,
+/// so that its error is below that of any fault that the test must detect. With Mesa's rasterizer, the PSNR is 52.3 dB
+/// and the largest error is 14/255. Other drivers use other sample positions and rounding.
 constexpr int kGoldenGlGrid = 16;
 constexpr ImageTolerance kGoldenGl{"gl", 24.0 / 255, 1.0 / 255, 1, 50};
 constexpr ImageTolerance kGoldenGlOnePixel{"gl, one pixel", 12.0 / 255, 1.0 / 255, 1, 0};

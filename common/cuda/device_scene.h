@@ -86,7 +86,7 @@ class DeviceImages {
   /// All colour bytes of the images that like() allocated.
   Span<uint8_t> color_bytes() const { return color_bytes_; }
 
-  /// Copies, on the stream, the images of like() to host images of at most as many views.
+  /// On the stream, copies the images from like() into host images, which may have fewer views.
   void copy_to_host(const ImageBatch& host, cudaStream_t stream = nullptr) const {
     const auto views = static_cast<std::size_t>(host.num_views);
     auto copy = [&](void* to, const void* from, std::size_t bytes) {

@@ -33,7 +33,7 @@ PICTURA_HD inline void prefetch(const void* first, int offset_bytes = 0) {
   asm volatile("prefetch.global.L2 [%0];" : : "l"(address));
 #else
   __builtin_prefetch(reinterpret_cast<const void*>(address));
-  asm volatile("");  // otherwise g++ considers a function that only prefetches to have no effect, and drops its calls
+  asm volatile("");  // otherwise g++ drops calls of a function that only prefetches, as if it had no effect
 #endif
 }
 

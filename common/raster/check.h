@@ -27,7 +27,7 @@ const RendererConfig& check_config(std::string_view renderer, const RendererConf
 void check_scene(std::string_view renderer, const SceneBatch& scene, const HostGeometries& geometries);
 
 /// Throws Error unless each view's world, ego and range of hidden agents exist in the host scene, which check_scene()
-/// must have accepted. A view's pose must be finite, and its key's agent must be valid for random numbers.
+/// must have accepted. A view's pose must be finite, and the agent of its key must be below RandomKey::kMaxAgents.
 void check_views(std::string_view renderer, const SceneBatch& scene, Span<const View> views);
 
 /// Returns the first `count` views of a host batch. Throws Error unless the count is between 0 and the number of views.
@@ -47,8 +47,8 @@ void check_handle(std::string_view renderer, GeometryHandle handle);
 /// Throws Error unless both sizes of Renderer::reserve are non-negative.
 void check_reserved(std::string_view renderer, int max_views, int max_boxes);
 
-/// Throws Error unless each strip, wall and light head is finite and has non-negative sizes, colours in [0, 1] and an
-/// existing signal. The grids must contain all strips and walls.
+/// Throws Error unless all strips, walls and light heads are finite, strips and walls have non-negative sizes and
+/// colours in [0, 1], and light heads have existing signals. The grids must contain all strips and walls.
 void check_geometry(std::string_view renderer, const StaticGeometry& geometry);
 
 /// Converts a rig's cameras to the form that rasterizers use, in the ego frame.

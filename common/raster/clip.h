@@ -10,9 +10,9 @@ namespace pictura {
 /// Clipping by five planes adds at most one corner per plane; one further corner is for a cut in progress.
 constexpr int kMaxPolygonCorners = kMaxFaceCorners + 6;
 
-/// One of the five planes of the frustum: the near plane and four sides. inside() is a distance from the plane in a
-/// unit that depends on the plane, negative outside. Each plane has coefficients for all terms, so that lanes of a warp
-/// can use different planes without branches.
+/// One of the five planes of the frustum: the near plane and four sides. inside() is a distance from the plane,
+/// negative outside, in a unit that depends on the plane. Each plane has coefficients for all terms, so that lanes of a
+/// warp can use different planes without branches.
 constexpr int kClipPlanes = 5;
 class ClipPlane {
  public:
@@ -67,9 +67,9 @@ PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_insid
 /// Maximum number of corners that widen_in_front() emits.
 constexpr int kMaxWidenedCorners = 5;
 /// Widens a strip in camera coordinates to at least floor_px on screen. If the strip crosses the near plane, it is cut
-/// there, and only its far end is widened: if its sides moved as a whole, they would leave the strip near the camera.
-/// Calls emit(i, corner) for i = 0, 1, ... and returns the number of corners. For other faces, floor_px is 0 and the
-/// corners do not change.
+/// there, and only its far end is widened: sides moved as a whole would deviate from the strip near the camera. Calls
+/// emit(i, corner) for i = 0, 1, ... and returns the number of corners. For other faces, floor_px is 0 and the corners
+/// do not change.
 template <typename Emit>
 PICTURA_HD inline int widen_in_front(const PinholeCamera& camera, float floor_px, const Vec3* corners, Emit&& emit) {
   Vec3 widened[4];

@@ -1,4 +1,4 @@
-// Compositing: the weight of each fragment of a pixel in the pixel's colour, computed from the fragment's visible
+// Compositing: how much each fragment of a pixel weighs in the pixel's colour, computed from the fragment's visible
 // samples. A fragment is the part of a pixel that one face covers. Also converts colours to the formats of images.
 // Shared by host and CUDA code.
 #pragma once

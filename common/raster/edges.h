@@ -12,8 +12,8 @@ namespace pictura {
 struct alignas(16) PolygonEdge {
   float x0 = 0, y0 = 0;  // the upper end
   float half_dx_dy = 0;  // half of dx/dy of the line; 0 for level edges
-  // Together with rows_offset and rows_step, it maps the line to sample heights (see make_edge()). It is negative if
-  // the face is above the edge. row_span() reads only this member and the members before it.
+  // Together with rows_offset and rows_step, rows_scale maps the line to sample heights (see make_edge()). It is
+  // negative if the face is above the edge. row_span() reads only this member and the members before it.
   float rows_scale = 0;
   float y1 = 0;     // the lower end's y; equal to y0 for level edges, which bound no area
   float dy_dx = 0;  // dy/dx of the line; 0 for level edges
@@ -44,9 +44,9 @@ constexpr float kLevel_px = 1e-6f, kUpright_px = 1e-6f;
 constexpr int kSampleColumns = kInt16x8Size, kSampleRows = 8;
 /// Sample tests use heights as 16-bit integers, kRowUnits per row, relative to the pixel's centre. In the first column
 /// right of the centre, a line's height is clamped to +-kLines_rows / 2; per column, it changes by at most kSteepest
-/// rows. So a clamped line does not cross the pixel, and 16 bits do not overflow. The slopes of steeper lines are
-/// reduced to kSteepest, so that they cross a column over some 8 rows. An upright line would otherwise include all
-/// samples of a column or none, which would quantize areas to eighths of the pixel.
+/// rows. So a clamped line does not cross the pixel, and 16 bits do not overflow. Steeper lines get the slope
+/// kSteepest, so that they cross a column over some 8 rows. An upright line would otherwise include all samples of a
+/// column or none, which would quantize areas to eighths of the pixel.
 constexpr int kRowUnits = 128;
 constexpr float kLines_rows = 256.0f, kSteepest = 9.0f;
 

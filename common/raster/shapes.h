@@ -279,8 +279,8 @@ PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& came
   emit_quad(strip_quad(strip), camera, floor_px, emit);
 }
 
-/// Strips are on one level if their heights differ by less than this. The rank, not the depth, decides which of such
-/// strips is in front.
+/// Strips are on one level if their heights differ by less than this. The rank, not the depth, decides which of them is
+/// in front.
 constexpr float kSameLevel_m = 0.05f;
 /// The depth of a strip is clamped to the range of its corners' depths, widened by this factor. Otherwise, if the
 /// camera is close to the strip's plane, the depth would vary without bound within a pixel.

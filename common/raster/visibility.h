@@ -103,7 +103,7 @@ PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQua
   };
   const Interval of_a = project(a), of_b = project(b);
   // Displacement along the axis after which the quads would only touch, times the side's length. The displacement is
-  // positive even if one interval is a point (that of a wall) within the other interval.
+  // positive even if one interval, that of a wall, is a point within the other interval.
   const float overlap = min_no_nan(of_a.high - of_b.low, of_b.high - of_a.low);
   const float length2_m2 = dot(side, side);
   return length2_m2 > 1e-12f && (overlap <= 0.0f || overlap * overlap <= kTouching_m * kTouching_m * length2_m2);
@@ -294,8 +294,8 @@ PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Ve
 
 /// Returns the shared samples at which face a is in front of face b; a and b belong to two primitives. At the other
 /// shared samples, b is in front. Usually, one decision at the centroid holds for all shared samples. If two solids
-/// intersect within a pixel of the centroid and all_or_none is false, each sample is decided separately by the rule of
-/// is_in_front(): the lower object id is in front unless the other face is nearer by more than kEqualDepth.
+/// intersect less than one pixel from the centroid and all_or_none is false, each sample is decided separately by the
+/// rule of is_in_front(): the lower object id is in front unless the other face is nearer by more than kEqualDepth.
 template <typename Stands>
 PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
                                             bool all_or_none, Stands&& stands) {

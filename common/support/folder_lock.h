@@ -11,7 +11,7 @@ namespace pictura {
 /// in the folder with flock; that file remains and records the last holder. The lock is advisory.
 class FolderLock {
  public:
-  /// Throws Error naming the folder and the process that holds the lock.
+  /// Throws Error naming the folder and, if another process holds the lock, that process.
   explicit FolderLock(const std::string& folder);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;

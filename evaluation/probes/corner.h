@@ -1,5 +1,5 @@
 // Probe of blind corners (paper, "Closed-loop driving reveals occlusion-aware behavior"). It compares how policies
-// approach corners at which walls hide a crossing vehicle with how they approach empty corners. Includes no torch
+// approach two kinds of corners: those at which walls hide a crossing vehicle, and empty ones. Includes no torch
 // headers.
 #pragma once
 
@@ -51,11 +51,11 @@ void visit_options(CornerOptions& options, Visitor&& v) {
 /// part of it. Renderer::visibility decides this, in the cameras of the first policy that reads images, or in the
 /// paper's cameras if no policy reads images. All states, with and without a hidden vehicle, are kept only if their
 /// scene lasts kTakeoverSteps more steps. Each pair of match_corners() is a state with a hidden vehicle and a similar
-/// state without one.
-/// Each policy then drives the ego for kTakeoverSteps (TakeoverWorlds) from three states: the state with the hidden
-/// vehicle, this state after removal of the vehicle, and the similar state. Each run takes place in a world with walls
-/// and in a world without walls. `batch` pairs run together. An interrupt ends the probe with the completed pairs.
-/// Throws UsageError if policies cannot drive equal numbers of scenes. Throws Error naming file and key for bad input.
+/// state without one. Each policy then drives the ego for kTakeoverSteps (TakeoverWorlds) from three states: the state
+/// with the hidden vehicle, this state after removal of the vehicle, and the similar state. Each run takes place in a
+/// world with walls and in a world without walls. `batch` pairs run together. An interrupt ends the probe with the
+/// completed pairs. Throws UsageError if the number of scenes is not a multiple of the number of policies. Throws Error
+/// naming file and key for bad input.
 CornerResults probe_corner(const CornerOptions& options);
 /// Probes policies that are already open on one device, with their renderers and cameras. options.policies holds their
 /// names.

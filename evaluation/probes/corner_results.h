@@ -80,9 +80,8 @@ struct CornerMeasures {
   Estimate distance_m, corner_m, speed_mps, approach_mps, deceleration_mps2;
 };
 
-/// Statistics of one policy's runs of a case, or of differences between two runs of each pair. The run that a
-/// difference subtracts is less_policy's run of the same case, or the same policy's run of less_case. Estimates are
-/// over scenes.
+/// Statistics of one policy's runs of a case, or of differences between two runs of each pair. A difference subtracts
+/// less_policy's run of the same case, or the same policy's run of less_case. Estimates are over scenes.
 struct CornerRow {
   bool walls = true;
   CornerCase its_case = CornerCase::hidden;

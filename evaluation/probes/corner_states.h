@@ -24,8 +24,8 @@ struct BlindCorner {
   std::map<int32_t, Vec3> lanes;
 };
 constexpr float kCornerLead_m = 60;
-/// Blind corners by the ego's lane. Every lane that leads to a corner and is at most kCornerLead_m before its junction
-/// has an entry.
+/// Blind corners by the ego's lane. The keys are all lanes that lead to a corner and are at most kCornerLead_m before
+/// its junction.
 using BlindCorners = std::map<int32_t, BlindCorner>;
 BlindCorners find_blind_corners(const RoadMap& map, Span<const WallFace> walls);
 

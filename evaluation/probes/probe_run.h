@@ -59,8 +59,8 @@ struct KeptScene {
 
   /// Adds a world, followed by inserted boxes.
   void add_world(const ProbeFrame& frame, size_t world, Span<const InsertedBox> inserted = {});
-  /// Return the index in this scene of a box of the last added world: for box_of(), of the frame's box `box_of_frame`;
-  /// for first_inserted(), of the first inserted box.
+  /// Return the index in this scene of a box of the last added world: the frame's box `box_of_frame`, or the first
+  /// inserted box.
   int32_t box_of(const ProbeFrame& frame, size_t world, int32_t box_of_frame) const {
     return box_of_frame - frame.box_begin[world] + world_begin[geometry.size() - 1];
   }
@@ -116,7 +116,7 @@ class ProbeRun final : public EvaluationObserver {
   /// Drives all scenes: each policy drives its share, or options.worlds.controller drives all. Passes the worlds'
   /// states to `sample` after every sample_steps steps. Finally evaluates the remaining pairs, and returns the
   /// visibility of every pair's measured_box, in the order of add_pairs(). If `watch` is given, only the driver's
-  /// worlds are simulated, and add_pairs() must not be called.
+  /// simulator runs, none for other policies' observations, and add_pairs() must not be called.
   std::vector<float> run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch = {});
 
   /// Adds pairs of the current frame. Their responses are appended to the results in the order of the pairs.
@@ -178,7 +178,8 @@ class ProbeRun final : public EvaluationObserver {
   ProbeResults& results_;
 };
 
-/// Throws UsageError if policies cannot drive equal numbers of scenes, or if there is nothing to sample.
+/// Throws UsageError if the number of scenes is not a multiple of the number of policies, or if there is nothing to
+/// sample.
 void check_probe(const ProbeOptions& options, size_t num_policies);
 
 /// Opens a policy of the options, by its index.

@@ -26,7 +26,7 @@ struct RemovalCase {
   int32_t scene = 0, map = 0, driver = 0;  // number of the scenario; indices of its map and driver
   int32_t step = 0;                        // steps done in the scenario
   int32_t ego = 0, user = 0;
-  int32_t hidden = -1;  // hidden agent; equals `user` without a control; -1: none
+  int32_t hidden = -1;  // hidden agent as RemovalControl says; -1: none
   AgentClass user_class = AgentClass::vehicle;
   bool user_halted = false;
   float distance_m = 0;  // on the ground, from the ego's rear axle to the centre of the user

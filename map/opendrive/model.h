@@ -19,7 +19,7 @@
 
 namespace pictura::opendrive {
 
-/// Name and line index of the file. Converts the byte offset of an element to its line, counted from 1.
+/// Name of the file and positions of its line ends. Converts the byte offset of an element to its line, counted from 1.
 class Source {
  public:
   Source() = default;
@@ -202,7 +202,7 @@ struct CrossSection {
 };
 
 /// Deformation of a road's points in an affine copy of its map; see deform.h. The shift of the reference line changes
-/// from start to end as a smoothstep of s. So the shift changes the heading at neither end.
+/// from start to end as a smoothstep of s. So the heading does not change at either end.
 struct RoadDeformation {
   PlanMap plan;
   std::array<double, 2> start_shift_m{}, end_shift_m{};

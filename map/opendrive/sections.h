@@ -8,8 +8,8 @@
 
 namespace pictura::opendrive {
 
-/// Splits the lanes of a section at the distance `ds` from its start. Returns the parts beyond as lanes of a new
-/// section; `lanes` keeps the parts before. Each lane and its continuation are linked to each other.
+/// Splits the lanes of a section at the distance `ds` from its start. Returns the parts after the split as lanes of a
+/// new section; `lanes` keeps the parts before it. Each lane and its continuation are linked to each other.
 std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds);
 
 /// Removes a section without length. The previous section is extended to the removed section's end. Links into the

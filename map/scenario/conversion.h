@@ -44,7 +44,7 @@ struct Conversion {
 };
 
 /// Removes duplicate points, and inserts points so that no piece is too long. Points are relative to the origin. `what`
-/// names the line in notes.
+/// is the line's name in notes.
 std::vector<CurvePoint> cut_into_pieces(Conversion* conversion, const std::vector<CurvePoint>& points,
                                         const std::string& what);
 

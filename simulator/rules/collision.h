@@ -116,8 +116,8 @@ PICTURA_HD inline bool touches(const OrientedBox& box, Vec2 a_m, Vec2 b_m) {
   return true;
 }
 
-/// Whether the box touches any barrier on its level. A test at the end of each step suffices: boxes are longer than
-/// their motion in a step, so that consecutive boxes overlap.
+/// Whether the box touches any barrier on its level. A test at the end of each step suffices: a box is longer than its
+/// motion in a step, so that its positions before and after the step overlap.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool touches_any(const OrientedBox& box, float z_m, Span<const Barrier> barriers, const GridView& cells,
                             const ThreadGroup& group = {}) {

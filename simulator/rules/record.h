@@ -99,8 +99,8 @@ PICTURA_HD inline RecordedState replayed_state(const MapView& map, int i, int st
   return agent < static_cast<int>(map.recorded_agents.size()) ? recorded_state(map, agent, step) : RecordedState{};
 }
 
-/// Places box num_agents + i, that of replayed track i, at the track's state `step` steps after the episode's start, or
-/// removes the box if the track is absent then. Only the first thread of the group writes.
+/// Box num_agents + i belongs to replayed track i. Places the box at the track's state `step` steps after the episode's
+/// start, or removes it if the track is absent then. Only the first thread of the group writes.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void replay_track(const WorldView& world, int i, int step, const ThreadGroup& group = {}) {
   const RecordedState at = replayed_state(world.map, i, step);

@@ -137,8 +137,8 @@ PICTURA_HD inline bool is_lane_change(const MapView& map, int32_t before, int32_
 /// Whether the step violates stop line `light`. `state` is the light's state during the step, which the agent observed
 /// before the step. A violation requires a red light and one of two events. Either the front bumper crosses the line,
 /// or the agent, with its bumper already past the line, changes from a lane without a light to a lane of this light. An
-/// event counts only on the line's level, if the heading is within 45 degrees of the line's direction, and if the
-/// bumper is within 10 m of the line's middle. It is no violation to stand on a line that turns red, to clear the
+/// event counts only if the agent is on the line's level, its heading is within 45 degrees of the line's direction, and
+/// its bumper is within 10 m of the line's middle. It is no violation to stand on a line that turns red, to clear the
 /// junction behind the line, or to enter the next lane of the route.
 PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossing& crossing, LightState state) {
   if (state != LightState::red) return false;

@@ -330,7 +330,7 @@ PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const ThreadG
 }
 
 /// Whether the agent takes part in the episode. `i` is the try at which it found a place, or -1. On maps with a record,
-/// all agents take part; but if some tracks are replayed, only agents that are present at the start.
+/// all agents take part; if some tracks are replayed, only agents present at the start do.
 PICTURA_HD inline bool joins_episode(const WorldView& world, int agent, int i) {
   if (has_replayed_tracks(world.map)) return has_body(world.agents.status[world.first_slot + agent]);
   return i >= 0 || has_record(world.map);

@@ -52,7 +52,7 @@ PICTURA_HD inline bool ends_way(const WorldView& world, int agent) {
 }
 
 /// Tests whether the motion from `from` to `to` passes waypoints; returns event bits. The goal of the metric Goals is a
-/// chain's last waypoint, from the time at which it becomes active. It remains the goal until it is passed within
+/// chain's last waypoint, from the time at which it is the next waypoint. It remains the goal until it is passed within
 /// kMetricGoalRadius_m, or until the next chain's last waypoint replaces it. So an agent can still reach it after
 /// passing it at the larger distance that the reward accepts.
 template <typename ThreadGroup>
@@ -265,8 +265,8 @@ PICTURA_HD inline StepFacts step_facts(const Motion& motion, const LaneFit& fit,
 
 /// Phase 3: computes the reward of an active agent and returns its terms. After an infraction, the agent halts or
 /// leaves, as options.after_infraction says; it also leaves at its goal (options.leave_at_goal) or where its road ends.
-/// An agent that leaves becomes absent or waiting, but its box remains visible until the next step, in which it takes
-/// no part in collisions. Phase 2 of other agents reads no data that this phase writes.
+/// An agent that leaves becomes absent or waiting; its box remains visible until the next step, but takes no part in
+/// that step's collisions. Phase 2 of other agents reads no data that this phase writes.
 PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int agent) {
   if (!is_active(world, agent)) return {};
   const AgentStateView& agents = world.agents;

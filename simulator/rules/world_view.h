@@ -48,7 +48,7 @@ struct WorldView {
   GridView box_cells;                // indices of visible boxes, by the cell of their centres
   Vec2* cell_centers = nullptr;      // [num_boxes] centres of the boxes of box_cells.items, in that order
   LightPlan* light_plans = nullptr;  // [stop lines]
-  LightState* lights = nullptr;      // [stop lines] states during the step, which agents observe before it
+  LightState* lights = nullptr;      // [stop lines] states during the step; agents observe them before the step
 };
 
 PICTURA_HD inline Motion motion_of(const AgentStateView& agents, int slot) {
@@ -150,8 +150,8 @@ PICTURA_HD inline Hides hidden_from(const WorldView& world, int agent) {
   return hidden_by(active_impairment(world, agent));
 }
 
-/// Returns the view of the agent's cameras. For absent agents, see Simulator::views(). `hidden` is hidden_from() the
-/// agent.
+/// Returns the view of the agent's cameras. For absent agents, see Simulator::views(). `hidden` must be the result of
+/// hidden_from().
 PICTURA_HD inline View view_of(const WorldView& world, int agent, Hides hidden) {
   View view;
   view.world = world.index;

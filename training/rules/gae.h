@@ -20,15 +20,15 @@ struct GaeTransition {
   bool is_terminated, is_truncated, is_valid, is_decision;
 };
 
-/// Result of the recursion for the steps after a step. value: discounted rewards up to the next decision, plus the
-/// value there. advantage: discounted advantage of that decision.
+/// Result of the recursion over all steps after a given step. value: discounted rewards up to the next decision, plus
+/// the value there. advantage: discounted advantage of that decision.
 struct GaeTail {
   float value = 0, advantage = 0;
 };
 
-/// Returns the advantage of a step's decision; 0 if the step has no decision. tail_inout: the tail after this step,
-/// which becomes the tail after the previous step. Each step discounts by gamma, each decision by gae_lambda. An action
-/// held for k steps returns the sum of gamma^i r_i and bootstraps with gamma^k.
+/// Returns the advantage of a step's decision; 0 if the step has no decision. tail_inout: on entry the tail after this
+/// step, on return the tail after the previous step. Each step discounts by gamma, each decision by gae_lambda. An
+/// action held for k steps returns the sum of gamma^i r_i and bootstraps with gamma^k.
 PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float gamma, float gae_lambda,
                                       GaeTail* tail_inout) {
   const bool goes_on = !transition.is_terminated && !transition.is_truncated;

@@ -19,7 +19,7 @@ class LearnerExecutor : public PolicyExecutor {
   virtual void count_advantages(Span<const float> advantages, Span<const uint8_t> valid, Span<int64_t> counts_inout,
                                 Stream stream = {}) = 0;
   /// Writes the transitions that the advantage filter keeps, in ascending order, see advantage_filter.h. kept_out has
-  /// room for all transitions. Returns their number.
+  /// room for all transitions. Returns the number of kept transitions.
   virtual int64_t select_kept(Span<const float> advantages, Span<const uint8_t> valid, float threshold,
                               Span<int64_t> kept_out, Stream stream = {}) = 0;
   /// Permutes items: items_out[i] = items[permutation(i)].

@@ -64,7 +64,7 @@ class BallGrid {
   void visit_visible(const PinholeCamera& camera, const Frustum& f, const Aabb2& query_box, Visit&& visit) const {
     const CellRange cells = cells_of(grid_, query_box);
     for (int y = cells.y_begin; y < cells.y_end; ++y) {
-      // An item is visited only in the first of the query's columns and rows that contain the item.
+      // An item is visited only in the query's first column and first row that contain it.
       const int32_t first_column_end = begin(cells.x_begin + 1, y), row_end = begin(cells.x_end, y);
       const int row_starts = y == cells.y_begin ? kStartsRow : 0;
       for (int32_t i = begin(cells.x_begin, y); i < row_end; i += kLanes) {

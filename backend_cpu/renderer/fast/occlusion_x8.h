@@ -23,7 +23,7 @@ inline Float8 occluder_bound_x8(const ScreenFace& face, int x, int y) {
   return keep_bits(lowest * kLower, kBits);
 }
 
-/// Raises the bounds of pixels (x, y) to (x + 7, y), only left of x_end, to at least a solid's occluder_bound().
+/// For pixels (x, y) to (x + 7, y) left of x_end, raises the bounds to at least a solid's occluder_bound().
 inline void raise_occluder_bounds_x8(const ScreenFace& face, int x, int x_end, int y, float* bounds_inout) {
   const Float8 before = load8(bounds_inout), bound = max_no_nan(before, occluder_bound_x8(face, x, y));
   store8(select(lane_numbers() < static_cast<float>(x_end - x), bound, before), bounds_inout);
