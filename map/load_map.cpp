@@ -81,9 +81,9 @@ std::string file_path_of(const std::string& name) {
   }
   fail_usage("map '{}': expected an {} or {} file, {}, or a town in {}, which has {}{}", name, kExtension,
              kLanelet2Extension, fmt::join(families, ", "), map_folder(),
-             towns.empty()
-                 ? "none: CARLA's towns are part of CARLA, as Maps/OpenDrive/*.xodr; procedural:1 needs no file"
-                 : fmt::format("{}", fmt::join(towns, ", ")),
+             towns.empty() ? "none: CARLA's towns are part of CARLA, as Maps/OpenDrive/*.xodr; generated towns need no "
+                             "file (--map procedural:1)"
+                           : fmt::format("{}", fmt::join(towns, ", ")),
              suggestion(name, known));
 }
 
