@@ -26,7 +26,7 @@ Text text_of(RepairKind kind) {
     case RepairKind::late_section: return {"first sections after the start of their road", "they begin at the start"};
     case RepairKind::lane_gap: return {"lane ids with gaps", "filled by lanes without surface"};
     case RepairKind::center_id: return {"center lanes with another id than 0", "counted as 0"};
-    case RepairKind::short_road: return {"roads of no length", "they are 1 mm long and not counted"};
+    case RepairKind::short_road: return {"roads of no length", "made 1 mm long; their lanes are not counted"};
     case RepairKind::short_section: return {"lane sections of no length", "left out; links lead through them"};
     case RepairKind::empty_geometry: return {"geometries of no length", "left out"};
     case RepairKind::parameter_range:
@@ -34,18 +34,19 @@ Text text_of(RepairKind kind) {
     case RepairKind::line_length: return {"curves of another length than stated", "the curve's own length counts"};
     case RepairKind::geometry_station:
       return {"geometries that do not begin where the one before ends", "the one before is cut or extended"};
-    case RepairKind::moved_geometry: return {"geometries far from where the one before ends along s", "moved along s"};
+    case RepairKind::moved_geometry:
+      return {"geometries whose s is far from the end of the one before", "their s becomes that end"};
     case RepairKind::geometry_jump:
       return {"jumps of the reference line", "spread over ten metres, or ten times their size"};
     case RepairKind::geometry_gap: return {"gaps between geometries", "bridged by a straight line"};
     case RepairKind::height_jump: return {"jumps of the elevation", "spread over ten metres, or ten times their size"};
     case RepairKind::strip_surface: return {"cross-sections of strips", "flattened"};
     case RepairKind::missing_lane_type:
-      return {"lanes without a type", "counted as none in the center, as special lanes elsewhere"};
+      return {"lanes without a type", "of type none in the center, special lanes elsewhere"};
     case RepairKind::unknown_lane_type: return {"unknown lane types", "counted as special lanes"};
     case RepairKind::unknown_direction: return {"unknown lane directions", "counted as standard"};
     case RepairKind::unknown_flag: return {"flags that are neither true nor false", "counted as false"};
-    case RepairKind::unknown_mark: return {"unknown types of road marks", "painted by their lines; without lines, not"};
+    case RepairKind::unknown_mark: return {"unknown types of road marks", "only their lines are painted"};
     case RepairKind::unknown_color: return {"unknown colors of road marks", "painted white"};
     case RepairKind::unknown_lane_change: return {"unknown lane-change rules of road marks", "counted as both"};
     case RepairKind::unknown_orientation: return {"unknown orientations of signals", "they face both ways"};
@@ -56,8 +57,8 @@ Text text_of(RepairKind kind) {
     case RepairKind::unreadable_speed: return {"speed limits that cannot be read", "left out"};
     case RepairKind::misplaced_item: return {"objects and signals far from their road", "left out"};
     case RepairKind::shapeless_object: return {"objects without the size that they need", "left out"};
-    case RepairKind::continuous_object: return {"objects repeated without distance", "they stand once"};
-    case RepairKind::repeated_corners: return {"repeated objects with corners along the road", "they stand once"};
+    case RepairKind::continuous_object: return {"objects repeated without distance", "placed once"};
+    case RepairKind::repeated_corners: return {"repeated objects with corners along the road", "placed once"};
     case RepairKind::unsupported_junction: return {"junctions of kinds that are not supported", "they connect nothing"};
     case RepairKind::link_into_road: return {"links to the middle of a road", "left out"};
     case RepairKind::missing_road: return {"references to roads that do not exist", "left out"};
@@ -66,8 +67,9 @@ Text text_of(RepairKind kind) {
     case RepairKind::wrong_end: return {"links to the wrong end of a road", "the end that touches counts"};
     case RepairKind::one_sided_link: return {"links of roads that are not returned", "made mutual"};
     case RepairKind::unreturned_link:
-      return {"links of roads that are returned elsewhere", "kept, since the ends touch"};
-    case RepairKind::contrary_link: return {"links of roads that do not touch and are returned elsewhere", "left out"};
+      return {"links to a road's end that is linked to another road", "kept, because the ends touch"};
+    case RepairKind::contrary_link:
+      return {"links to a road's end that is linked elsewhere, without touching it", "left out"};
     case RepairKind::dangling_link:
       return {"links of lanes at an end of their road that is linked to nothing", "left out"};
     case RepairKind::unlike_link: return {"links of lanes of unlike types", "left out"};
@@ -80,7 +82,8 @@ Text text_of(RepairKind kind) {
     case RepairKind::repeated_controller: return {"controller ids used twice", "the first counts"};
     case RepairKind::missing_controller: return {"references to controllers that do not exist", "left out"};
     case RepairKind::uncontrolled_light:
-      return {"lights without a controller", "they cycle by heading at junctions, alone elsewhere"};
+      return {"lights without a controller",
+              "at junctions, similar headings share a phase; elsewhere each light cycles alone"};
     case RepairKind::unlisted_light: return {"lights that the controllers of their junction leave out", "left out"};
     case RepairKind::laneless_light: return {"lights without a lane", "left out"};
     case RepairKind::missing_link:
