@@ -64,8 +64,8 @@ class Policy {
   virtual std::string backbone_hash() const { return ""; }
   /// Throws Error, which names camera and file, if the program policy.backbone does not support the images of the rig.
   virtual void check_images(const Rig& /*rig*/) const {}
-  /// Side in px of the patches that the policy can read as images (ImageBlock); 0 if it reads only planar images. If
-  /// the renderer draws such patches, images need no conversion before the first convolution.
+  /// Side in px of the image patches that the policy can read (ImageBlock); 0 if it reads only planar images. If the
+  /// renderer draws such patches, images need no conversion before the first convolution.
   virtual int drawn_patch_px() const { return 0; }
 
  protected:
@@ -129,7 +129,7 @@ struct Decision {
   bool is_finite() const { return are_finite().item<bool>(); }
 };
 /// Runs the policy, chunk by chunk, for the agents with row numbers `rows`, i64 [batch]. act(rows) must return the
-/// policy's output for the rows of a chunk. The output may become invalid at the next call.
+/// policy's output for the rows of a chunk. Each output of act() may become invalid at the next call of act().
 Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
                 const std::function<Policy::Output(const at::Tensor& rows)>& act);
 

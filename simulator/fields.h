@@ -81,7 +81,7 @@ constexpr int kNumWaypoints = 3;
   X(goal_x_m, float, 1, 0, "last waypoint of a chain, for the metric Goals; see rules/step.h")                   \
   X(goal_y_m, float, 1, 0, "")                                                                                   \
   X(goal_z_m, float, 1, 0, "")                                                                                   \
-  X(goal_open, uint8_t, 1, 0, "1 while the metric waits for it")                                                 \
+  X(goal_open, uint8_t, 1, 0, "1: the goal is set and not yet passed")                                           \
   X(conditioning, float, 17, 0, "reward coefficients and dynamics multipliers; see simulator/conditioning.h")    \
   X(agent_class, AgentClass, 1, AgentClass::vehicle, "AgentClass")                                               \
   X(status, AgentStatus, 1, AgentStatus::absent, "AgentStatus")                                                  \
@@ -89,7 +89,7 @@ constexpr int kNumWaypoints = 3;
   X(halt_reason, uint8_t, 1, 0, "Event bits that halted it")                                                     \
   X(events, uint8_t, 1, 0, "Event bits of the last step")                                                        \
   X(goals_reached, int32_t, 1, 0, "last waypoints passed within 2 m in this episode")                            \
-  X(waypoints_reached, int32_t, 1, 0, "waypoints of any kind, passed or rewarded in this episode")               \
+  X(waypoints_reached, int32_t, 1, 0, "waypoints, goals too, passed within the reward's radius")                 \
   X(distance_m, float, 1, 0, "sum of |speed| dt in this episode")                                                \
   X(first_motion_step, int32_t, 1, 0, "first step (from 1) of this episode above kRest_mps; 0: none yet")        \
   X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                          \

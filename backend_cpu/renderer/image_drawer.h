@@ -46,8 +46,8 @@ class ImageDrawer {
   const Occluders& occluders() const { return setting_.occluders; }
   /// Draws the prepared image.
   void draw(const ImageTarget& target);
-  /// Adds the visible weight of an agent in the prepared image to sum_inout: once among all primitives, and once as if
-  /// the agent were alone.
+  /// Adds the agent's visible weight in the prepared image to sum_inout->among_all, and its weight without other
+  /// primitives to sum_inout->alone.
   void accumulate_visibility(int32_t agent, VisibilitySum* sum_inout);
   /// Calls visit(y * width + x, coverage, colour) for each fragment of each pixel of the prepared image, front to back.
   /// Benchmarks use it to measure other methods of compositing.

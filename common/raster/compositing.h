@@ -25,7 +25,8 @@ class PixelAccumulator {
     PICTURA_HD float of(Weight weight) const { return weight.area * of_kind[weight.kind]; }
   };
 
-  /// Weight of a fragment. `visible` are the fragment's effective samples that no other fragment occludes.
+  /// Weight of a fragment. `visible` are the samples of effective_samples() that no other fragment occludes; a sliver's
+  /// are all 64.
   PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, uint64_t visible) {
     const uint64_t samples = effective_samples(coverage);
     const float share = static_cast<float>(popcount(visible)) / static_cast<float>(popcount(samples));
@@ -63,7 +64,7 @@ class PixelAccumulator {
     if (whole > 1.0f) shares.of_kind[kWhole] = 1.0f / whole;
     if (partial > for_partial) shares.of_kind[kPartial] = for_partial / partial;
     const float remainder = area_of(kRemainder), left = max_of(for_partial - partial, 0.0f);
-    // `remainder` is less than 1 if other fragments hide some of its samples (divide_remainder).
+    // Full fragments have a total area below 1 if divide_remainder() removed some of their samples.
     shares.of_kind[kRemainder] = remainder > 0.0f && remainder < 1.0f ? left / remainder : left;
     return shares;
   }

@@ -1,5 +1,6 @@
-// Results of policies for a pedestrian that walks from behind a vehicle through a frozen state: every point, means
-// along the path, and files of both. Includes no torch headers.
+// Results of the tracked-pedestrian probe: responses of policies at every point of the paths, means of them, and files
+// of both. The pedestrian walks out from behind a vehicle, while the rest of the state is fixed. Includes no torch
+// headers.
 #pragma once
 
 #include <array>

@@ -101,8 +101,8 @@ void read_osm(std::string_view text, const std::string& name, opendrive::Faults*
 
 /// Sets the positions of all nodes and the geographic reference, and removes nodes without a position from ways. With
 /// `origin`, positions are UTM coordinates minus those of the origin. Without it, positions are local coordinates if
-/// any node has them, else UTM coordinates in the zone of the first node. Finally, `plan` (the plan of a copy) is
-/// applied to the positions.
+/// any node has them, else UTM coordinates in the zone of the first node. Finally, transforms the positions by `plan`,
+/// which makes an affine copy of a map (map/plan_map.h).
 void place_nodes(const std::optional<GeoPoint>& origin, const PlanMap& plan, opendrive::Faults* faults,
                  OsmFile* file_inout);
 

@@ -7,9 +7,9 @@
 
 namespace pictura::opendrive {
 
-/// Parses and checks `text`, and applies the header's offset. `text` must outlive `network_out`. Throws Error, which
-/// names source, line, owner and element, for malformed, missing, out-of-range or unsupported input without a sensible
-/// meaning. Other faults are repaired.
+/// Parses and checks `text`, and applies the header's offset. `text` must outlive `network_out`. Repairs faults that
+/// have only one sensible meaning. For other faults (in strict reading, for all) throws Error, which names source,
+/// line, owner and element.
 void read_network(std::string_view text, const std::string& source_name, Faults* faults, Network* network_out);
 
 }  // namespace pictura::opendrive

@@ -31,8 +31,8 @@ struct Arm {
   double mouth_m = 0;                               // distance from the node to the end of the street
 };
 
-/// Kind of a node. At a fork, the outermost lane of a motorway becomes a ramp in one direction of travel, and another
-/// ramp becomes the outermost lane in the other direction.
+/// Kind of a node. At a fork, one carriageway of a motorway has an exit (its outermost lane becomes a ramp), and the
+/// other has an entry (a ramp becomes its outermost lane).
 enum class NodeKind { crossing, roundabout, overpass, fork };
 
 /// Kind of a street. Connectors lead from the town to its motorway. Ramps are one-way, from Street::from to Street::to.

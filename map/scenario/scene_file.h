@@ -13,7 +13,7 @@ namespace pictura {
 
 constexpr std::string_view kSceneFileEnding = ".scenario";
 
-/// Returns the file kind for encode_fields() and decode_fields(). Native files use it with an empty key.
+/// Returns the file kind for encode_fields() and decode_fields(). Native files use it with a default SceneCacheKey.
 FieldFileKind scene_file_kind();
 
 /// Writes a file, completely or not at all. Throws UsageError for a name without the ending kSceneFileEnding, and
