@@ -17,8 +17,8 @@ constexpr float kMinInverseDepth = 1e-4f, kMaxInverseDepth = kWidenedDepth;
 /// One instance of the draw call: a flat quadrilateral, in camera coordinates.
 struct FaceInstance {
   Vec3 corner[4];  // in order around the quadrilateral
-  // The depth test uses the depth of the plane compared_plane . p = 1. If compared_plane is 0, it uses the face's own
-  // depth.
+  // The depth test uses the depth of the plane of all points p with dot(compared_plane, p) = 1. If compared_plane is 0,
+  // it uses the face's own depth.
   Vec3 compared_plane;
   Rgb color;
   int32_t layer = 0;  // layer of the image array

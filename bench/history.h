@@ -1,5 +1,5 @@
-// Measures the time of drawing views of random agents: of random steps of a scene history, and of the current scene.
-// Also checks that images from the history equal the images that were drawn during the step.
+// Measures how long it takes to draw views of random agents, from random steps of a scene history and from the current
+// scene. Also checks that images from the history equal the images that were drawn during the step.
 #pragma once
 
 #include <string>

@@ -92,7 +92,7 @@ class ParameterVisitor {
       }
     });
   }
-  /// Adds policies: files, or Python functions that respond.
+  /// Adds policies: names of files, or Python functions.
   template <typename Options>
   void policies(const NamedOption& option, Options& options) {
     using Given = std::vector<std::variant<std::string, py::function>>;

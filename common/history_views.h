@@ -1,4 +1,5 @@
-// Mapping from a row of a SceneHistory to a view of the history's scene. Shared by host and CUDA code.
+// Mapping from the index (row) of a stored view of a SceneHistory to a view of the history's scene. Shared by host and
+// CUDA code.
 #pragma once
 
 #include "pictura/common/scene_types.h"

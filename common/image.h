@@ -34,9 +34,9 @@ int64_t image_values(ImageSize size, ChannelOrder order, int patch_px = kDefault
 void check_patch_px(std::string_view renderer, ChannelOrder order, int patch_px);
 
 /// Place of one camera's images in the memory of an ImageLayout. Offsets and strides count values (channels of pixels).
-/// Channel c of pixel (x, y) of a view is value offset + view * view_stride + c * channel_stride + y * row_stride + x *
-/// pixel_stride. If the order is patches, it is value offset + view * view_stride + place_in_patches(patch_px, width,
-/// c, x, y), and the last three strides are 0.
+/// The index of channel c of pixel (x, y) of a view is offset + view * view_stride + c * channel_stride + y *
+/// row_stride + x * pixel_stride. If the order is patches, the index is offset + view * view_stride +
+/// place_in_patches(patch_px, width, c, x, y), and the last three strides are 0.
 struct CameraLayout {
   ImageSize size;
   int block = 0;  // index into ImageLayout::blocks
@@ -80,7 +80,8 @@ struct CameraImages {
   uint16_t* instance_id = nullptr;  // optional, 1 + index of the agent in its world; 0: none
 };
 
-/// Returns the images of one camera, in memory of a layout that begins at `first`. The optional pointers are null.
+/// Returns one camera's images in the memory that begins at `first` and has the given layout. The optional pointers are
+/// null.
 CameraImages camera_images(const ImageLayout& layout, int camera, void* first);
 
 /// Images that Renderer::render() fills. All renderers draw planar images. Renderers whose draws_all_formats() is true

@@ -31,9 +31,9 @@ class SceneHistory {
   virtual Device device() const = 0;
   const SceneHistorySize& size() const { return size_; }
 
-  /// Stores a scene and the views of its agents at `step`, replacing the step's previous content. Steps must first be
-  /// filled in ascending order. Throws Error if the scene is on another device, has other sizes or has hidden agents,
-  /// or if an earlier step was never filled.
+  /// Stores a scene and the views of its agents at `step`, replacing the step's previous content. Steps must be filled
+  /// for the first time in ascending order. Throws Error if the scene is on another device, has other sizes or has
+  /// hidden agents, or if an earlier step was never filled.
   void put(int step, const SceneBatch& scene, Span<const View> views, Stream stream = {});
 
   /// Returns the scene of all steps that have been put.

@@ -8,7 +8,7 @@
 namespace pictura {
 
 struct EvaluateSection {
-  /// Conditioning of every agent, in the file as [evaluate.conditioning] NAME = value.
+  /// Conditioning of every agent, written as [evaluate.conditioning] NAME = value in the file.
   std::array<double, kNumConditioning> conditioning = default_conditioning();
   static std::array<double, kNumConditioning> default_conditioning();
 };

@@ -29,7 +29,7 @@ class EvaluationObserver : public StepObserver {
  public:
   /// Called at the start of the worlds' episodes.
   virtual void begin(Simulator& simulator) = 0;
-  /// Called after all worlds of the batch are counted. An interrupt ends the batch without this call.
+  /// Called after all worlds of the batch are driven to the end. An interrupt ends the batch without this call.
   virtual void end() {}
 };
 

@@ -41,8 +41,8 @@ struct SceneEvaluation {
   std::vector<std::string> faults() const;
 };
 
-/// Returns the world configuration of a protocol: `config`, the configuration of an evaluation, without the features
-/// that recorded scenes lack.
+/// Returns `config`, the configuration of an evaluation, with the protocol's settings and without the features that
+/// recorded scenes lack.
 SimulatorConfig protocol_config(const SceneProtocol& protocol, SimulatorConfig config);
 
 /// Evaluates a driver in recorded scenes. Scenes that cannot be read or simulated are left out and reported. Throws

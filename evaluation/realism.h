@@ -104,8 +104,8 @@ class RealismScene {
 /// NaN at steps whose recorded value is NaN. Simulated NaNs are ignored. If all simulated values are NaN, all results
 /// are NaN.
 std::vector<double> log_likelihoods(const RealismTerm& term, Span<const double> recorded, Span<const double> simulated);
-/// Returns the log-likelihood that the recording contains an event (`recorded` is true) or not, if `count` of
-/// `rollouts` rollouts contain it.
+/// Returns the log-likelihood that a recording contains an event (if `recorded`) or lacks it (otherwise), given that
+/// `count` of `rollouts` rollouts contain it.
 double event_log_likelihood(const RealismTerm& term, bool recorded, int count, int rollouts);
 
 /// Scores of many scenes.

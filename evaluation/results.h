@@ -115,7 +115,7 @@ struct EvaluationResults {
   std::vector<DensityResult> densities;
 };
 
-/// Ratio of two sums over scenarios, with its 95 % confidence interval value +- half_width_95. The interval is for the
+/// Ratio of two sums over scenarios, with its 95 % confidence interval: value +- half_width_95. The interval is for the
 /// ratio over all scenarios that could be drawn. Its half width follows from the linearised variance between scenarios;
 /// it is infinite for one scenario.
 struct Estimate {

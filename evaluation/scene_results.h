@@ -1,4 +1,4 @@
-// Results of evaluated vehicles in recorded scenes, by road user, by scene and over all scenes, and files from which
+// Results of evaluated vehicles in recorded scenes (by road user, by scene and over all scenes), and files from which
 // parts of an evaluation are merged. Includes no torch headers.
 #pragma once
 

@@ -36,7 +36,7 @@ std::string map_copy_name(std::string_view map, int copy);
 PlanMap draw_map_copy(std::string_view map_name, int copy);
 
 /// Expands every range of procedural towns, such as procedural:1000-1063 or city:1-4:blocks=2x2, into the names of its
-/// towns. Keeps other names. Throws UsageError, which names the range, if its ends descend or it has more than
+/// towns. Keeps other names. Throws UsageError, which names the range, if a range descends or has more than
 /// kMaxTownRange towns.
 std::vector<std::string> expand_map_names(const std::vector<std::string>& names);
 

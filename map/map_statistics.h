@@ -28,7 +28,7 @@ struct MapStatistics {
   // Share of lanes steeper than kSteepGrade; length of parking lanes divided by that of driving lanes outside
   // junctions.
   double steep_share = 0, parking_share = 0;
-  // Numbers of junctions by number of roads: at most 3, 4, 5, at least 6.
+  // Numbers of junctions by number of roads: at most 3, exactly 4, exactly 5, and at least 6.
   std::array<int, 4> junctions_of_arms{};
   // Quantiles of the distance of a traffic light's head beyond the middle of its stop line.
   std::array<double, 3> head_ahead_m{};

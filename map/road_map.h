@@ -1,5 +1,6 @@
-// RoadMap: the validated, immutable road network that all other code reads, for any file format. Positions are floats,
-// in metres relative to an origin in double precision. Indices refer to the vectors of the same RoadMap; -1 means none.
+// RoadMap: the validated, immutable road network, from any file format, that all other code reads. Positions are
+// floats, in metres relative to an origin in double precision. Indices refer to the vectors of the same RoadMap; -1
+// means none.
 #pragma once
 
 #include <array>

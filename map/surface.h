@@ -42,8 +42,8 @@ class Surface {
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted) const {
     return any_near(near, p, z, is_wanted, [](int32_t) { return true; });
   }
-  /// Calls visit(band) for bands that cover `p` and that is_wanted(band) accepts, until a call returns true; returns
-  /// whether a call did.
+  /// Calls visit(band) for bands that is_wanted() accepts and that cover `p`, until a visit returns true; returns
+  /// whether one did.
   template <typename IsWanted, typename Visit>
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted, Visit&& visit) const {
     if (!near.are_complete) return any_band_at(p, z, [&](int32_t band) { return is_wanted(band) && visit(band); });
@@ -75,7 +75,7 @@ class Surface {
     int32_t band = 0;
   };
 
-  /// Bounds outside which a quad covers nothing, including a margin of kNear_m and rounding.
+  /// Bounds that contain all positions that a quad covers, with a margin for kNear_m and rounding.
   struct QuadBounds {
     Vec2 low, high;
     float low_z = 0, high_z = 0;
@@ -99,7 +99,7 @@ class Surface {
     }
   };
 
-  /// Calls visit(index) for the quads of a cell whose bounds contain a position, until a call returns true; returns
+  /// Calls visit(index) for those quads of a cell whose bounds contain a position, until a call returns true; returns
   /// whether a call did.
   template <typename Visit>
   bool any_in_cell(std::size_t cell, Vec2 p, double z_m, Visit&& visit) const {

@@ -19,7 +19,7 @@ constexpr int64_t kBlockNumbers = 48 * 1024;
 /// may be x. bias: [channels].
 void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels, float* out, float* slope_out);
 
-/// Backward pass of bias_gelu(). Computes the gradient of x, slope * grad_out, and adds the gradient of the bias to
+/// Backward pass of bias_gelu(). Computes the gradient of x as slope * grad_out, and adds the gradient of the bias to
 /// bias_grad_inout, [channels]. grad_x_out may be grad_out.
 void bias_gelu_backward(const float* slope, const float* grad_out, int64_t rows, int64_t channels, float* grad_x_out,
                         float* bias_grad_inout);
@@ -41,10 +41,10 @@ void unfold(const ConvolutionSize& size, const float* images, int64_t n, float* 
 /// Backward pass of unfold(): computes the gradient of the images from the gradient of the taps.
 void fold(const ConvolutionSize& size, const float* taps_grad, int64_t n, float* images_grad_out);
 
-/// Splits the images of one camera, among u8 [views, cameras, 3, height, width], into patches of patch_px^2 pixels:
-/// [views, rows, columns, 3 patch_px^2]. Channel (c * patch_px + y) * patch_px + x is the value (0 to 255) of color c
-/// of pixel (x, y) of the patch; pixels beyond the image are 0. rows, columns: height and width over patch_px, rounded
-/// up.
+/// Splits the images of one camera into patches of patch_px^2 pixels. images: u8 [views, cameras, 3, height, width];
+/// out: [views, rows, columns, 3 patch_px^2]. Channel (c * patch_px + y) * patch_px + x is the value (0 to 255) of
+/// color c of pixel (x, y) of the patch; pixels beyond the image are 0. rows, columns: height and width over patch_px,
+/// rounded up.
 void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t camera, int64_t height, int64_t width,
              int64_t patch_px, float* out);
 

@@ -1,4 +1,4 @@
-// Sizes for both the policy's layers and the estimate of their memory.
+// Sizes that both the policy's layers and the estimate of their memory use.
 #pragma once
 
 #include <string_view>

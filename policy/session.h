@@ -68,8 +68,8 @@ class PolicySession {
   explicit PolicySession(std::unique_ptr<SessionParts> parts);
   ~PolicySession();
   /// Returns a session with an untrained policy of the same architecture, with the same worlds and cameras. Its weights
-  /// are initialized from `seed` as for training; weights of a program policy.backbone are those of its file. Throws
-  /// Error in builds without torch.
+  /// are initialized from `seed` as for training; a backbone program (policy.backbone) keeps the weights of its file.
+  /// Throws Error in builds without torch.
   std::unique_ptr<PolicySession> make_untrained(uint64_t seed) const;
   PolicySession(const PolicySession&) = delete;
   PolicySession& operator=(const PolicySession&) = delete;
@@ -99,8 +99,8 @@ class PolicySession {
   /// Hash of the policy's weights.
   std::string policy_hash() const;
 
-  /// Writes logits [batch, kNumActions] and values [batch]. `renderer` must have renderer_config(), and the scene's
-  /// maps must be uploaded to it with the handles of the scene; it may be null for policies without images. The size of
+  /// Writes logits [batch, kNumActions] and values [batch]. `renderer` must have renderer_config(), and hold the
+  /// scene's maps under the handles of the scene; `renderer` may be null for policies without images. The size of
   /// values_out is the batch size. Throws Error, which names the array, if the size of another array does not fit the
   /// batch size.
   void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out, Span<float> values_out);

@@ -17,8 +17,8 @@ struct SessionOptions {
   std::string device = "auto";    // see run.device of configurations
   std::string simulator = "cpu";  // see simulator.backend of configurations
   std::string renderer, samples;  // see render.backend and render.samples; empty: as in training
-  // Cameras that replace those of training, in equal number. They are those of a rig file or, if width_px and height_px
-  // are not 0, the paper's cameras with this image size.
+  // Cameras that replace those of training; the number of cameras must be the same. They are those of a rig file or, if
+  // width_px and height_px are not 0, the paper's cameras with this image size.
   std::string rig;
   int width_px = 0, height_px = 0;
   std::string backbone;  // path of the program policy.backbone; empty: the path in the policy's configuration

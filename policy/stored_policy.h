@@ -25,7 +25,7 @@ struct PolicyFacts {
   std::string path;  // source file, for messages
   Config config;
   Rig rig;
-  std::string backbone_hash;  // Policy::backbone_hash(); policy files do not contain the program itself
+  std::string backbone_hash;  // Policy::backbone_hash(); policy files do not contain the backbone program itself
   int64_t update = 0;         // number of completed updates of the training run
   int64_t agent_steps = 0;
   /// Learning-rate factors that are not 1, by name of the parameter; see Optimizer::rate_factors.
@@ -49,7 +49,7 @@ StoredPolicy parse_stored_policy(const std::string& file, const std::string& pat
 /// Writes a safetensors file: first to a temporary file, which is then renamed to `path`. The metadata are texts:
 /// config (TOML), schema and rig (JSON), rate_factors (JSON, if there are any), backbone_hash, update, agent_steps,
 /// commit (of this program), and hash. The hash is FNV-1a of the whole file with zeros in place of the 16 digits of the
-/// hash. Throws Error, which names the path, if it cannot be written.
+/// hash. Throws Error, which names the path, if the file cannot be written.
 void write_stored_policy(const std::string& path, const StoredPolicy& policy, WeightType type,
                          const std::string& commit);
 

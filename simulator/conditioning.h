@@ -20,7 +20,7 @@ enum class Conditioning : int32_t {
   velocity,
   reverse,
   overspeed,
-  timestep,  // these 14: reward
+  timestep,  // the first 14: reward
   throttle,
   steer,
   acceleration,  // the last 3: dynamics

@@ -71,7 +71,7 @@ constexpr int kNumWaypoints = 3;
   X(lane_offset_m, float, 1, 0, "signed, positive to the left of the centre line")                               \
   X(lane_angle_rad, float, 1, 0, "heading less the lane's direction, in [-pi, pi]")                              \
   X(speed_limit_mps, float, 1, 0, "of the current lane")                                                         \
-  X(waypoint_x_m, float, 3, 0, "the goal chain; passed ones stay until the chain is renewed")                    \
+  X(waypoint_x_m, float, 3, 0, "the goal chain; passed waypoints stay until it is renewed")                      \
   X(waypoint_y_m, float, 3, 0, "")                                                                               \
   X(waypoint_z_m, float, 3, 0, "")                                                                               \
   X(next_waypoint, int32_t, 1, 0, "index of the active one, in [0, 3)")                                          \

@@ -1,5 +1,5 @@
-// Sizes of the observation (paper, table of the policy architecture) and its arrays. docs/reference/observation.md
-// defines every observed number, its unit and its scale.
+// Sizes of the observation (paper, table of the policy architecture), and the list of its arrays.
+// docs/reference/observation.md defines every observed number, its unit and its scale.
 #pragma once
 
 #include "pictura/common/span.h"

@@ -16,12 +16,12 @@ namespace pictura {
 constexpr float kRecordedHeadAhead_m = 15.0f, kRecordedHeadHeight_m = 5.0f;
 
 /// Compiles the map of a scene. The scene's tracks become the agents of its worlds, in the same order. Each agent
-/// starts an episode in its recorded state at start_step, or absent if it has none. With options.recorded_lights, the
-/// road has the scene's lights with their recorded states: they are drawn and observed, and stop traffic. Recordings
-/// contain no positions of light heads; heads are placed kRecordedHeadAhead_m past the middle of the stop line and
-/// kRecordedHeadHeight_m above it. Throws Error if the map has no drivable lane, if there are more than
-/// kMaxAgentsPerWorld tracks, or if a track is too large to be simulated; the message names scene and track. Throws
-/// UsageError for a null pointer, or if the recording has no step start_step.
+/// starts an episode in its recorded state at start_step; an agent without such a state starts absent. With
+/// options.recorded_lights, the road has the scene's lights with their recorded states: they are drawn and observed,
+/// and stop traffic. Recordings contain no positions of light heads; heads are placed kRecordedHeadAhead_m past the
+/// middle of the stop line and kRecordedHeadHeight_m above it. Throws Error if the map has no drivable lane, if there
+/// are more than kMaxAgentsPerWorld tracks, or if a track is too large to be simulated; the message names scene and
+/// track. Throws UsageError for a null pointer, or if the recording has no step start_step.
 std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenario> scenario,
                                                     const MapOptions& options = {}, int32_t start_step = 0);
 

@@ -12,8 +12,8 @@ struct GradientNorms {
   double policy = 0, value = 0, entropy = 0;
 };
 
-/// Measures, only for the log, the gradients of single losses. It uses only so many of an update's first transitions
-/// that one forward and three backward passes are at most 3 % of the update's work.
+/// Measures, only for the log, the gradients of single losses. It uses so few of an update's first transitions that one
+/// forward and three backward passes are at most 3 % of the update's work.
 class GradientDiagnosis {
  public:
   /// Measures on `first`, the first of `minibatches`. The advantages of `first` must be set. The parameters' gradients

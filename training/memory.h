@@ -10,8 +10,8 @@ namespace pictura {
 /// keeps images if they take at most two fifths of its `memory_bytes`.
 bool keeps_images(const Config& config, int num_agents, Device device, int64_t memory_bytes);
 
-/// Returns how many images of an always active agent a rollout of num_steps steps keeps. The agent selects an action
-/// every decision_steps steps; images of other steps are not kept.
+/// Returns how many images a rollout of num_steps steps keeps of an agent that is always active. The agent selects an
+/// action every decision_steps steps; images of other steps are not kept.
 constexpr int64_t num_kept_images(int64_t num_steps, int decision_steps) { return num_steps / decision_steps + 1; }
 
 /// Returns the estimated bytes of simulator, rollout and update for all agents of a configuration. Counts only memory
@@ -40,8 +40,8 @@ struct MapMemory {
   double host = 0;    // maps as loaded, with the data for rules and renderers
   double device = 0;  // data for rules and renderers, on a device
 };
-/// Estimates the memory of maps from the sizes of their files and towns. names: names of maps as training_maps()
-/// returns them. The estimate is rarely too small. Throws as map_file_bytes() does.
+/// Estimates the memory of maps from the sizes of map files and of procedural towns. names: names of maps as
+/// training_maps() returns them. The estimate is rarely too small. Throws as map_file_bytes() does.
 MapMemory estimated_map_memory(const std::vector<std::string>& names);
 
 /// Throws Error if a run's maps do not fit into memory; the error gives the number of maps that would fit. Maps, agents

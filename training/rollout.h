@@ -65,7 +65,7 @@ class RolloutObservations {
 struct Rollout {
   RolloutObservations observations;         // num_steps + 1 steps; the last one follows the last action
   at::Tensor values;                        // f32 [num_steps + 1, num_slots]; 0 for agents that were not active
-  at::Tensor actions;                       // i32 [num_steps, num_slots], the shape below where none is given
+  at::Tensor actions;                       // i32 [num_steps, num_slots], like members below without a shape
   at::Tensor log_probs;                     // f32, log-probabilities of `actions`
   at::Tensor rewards;                       // f32
   at::Tensor terminated, truncated, valid;  // u8, as StepResult defines them

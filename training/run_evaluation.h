@@ -20,7 +20,8 @@ class RunEvaluation {
   bool is_due() const;
   /// Evaluates in train.evaluate_scenarios worlds of train.evaluate_agents agents for train.evaluate_steps steps. The
   /// result equals that of `pictura evaluate` on the checkpoint, with these numbers as --scenarios, --agents and
-  /// --steps. If the run averages weights, average_row equals the result with --average. Empty after an interrupt.
+  /// --steps. If the run averages weights, average_row equals the result with --average. The result is empty after an
+  /// interrupt.
   std::optional<EvaluationRecord> evaluate();
 
  private:

@@ -72,7 +72,7 @@ class RunLog {
 
   /// Returns the last updates. episode_return() is a mean over them.
   std::vector<RecentUpdate> recent() const { return {recent_.begin(), recent_.end()}; }
-  /// Mean over agent episodes that ended in the last updates; NaN before the first.
+  /// Mean return of agent episodes that ended in the last updates; NaN without such episodes.
   double episode_return() const;
 
  private:

@@ -15,8 +15,8 @@
 namespace pictura {
 
 /// Compiles a scene for worlds of num_agents agents. Roles, starts and goals are those of evaluations
-/// (evaluation/scene_plan.h), see with_tracks(). Road users beyond num_agents follow their records. Of the tracks that
-/// follow their records, at most config.parked_cars are kept: those nearest to driven tracks. `config` is the
+/// (evaluation/scene_plan.h), see with_tracks(). Road users beyond num_agents follow their records. Keeps at most
+/// config.parked_cars of the road users that follow their records: those nearest to driven road users. `config` is the
 /// configuration of the worlds. Returns null if the protocol allows no road user to be driven. Throws Error for scenes
 /// that cannot be read or simulated.
 std::shared_ptr<const CompiledMap> compile_training_scene(const SceneRef& scene, const SceneProtocol& protocol,

@@ -11,9 +11,9 @@ namespace pictura {
 
 class Teacher {
  public:
-  /// Creates the teacher of a learner of `config`, on `device`. Throws Error naming the teacher's file if the teacher
-  /// reads images. Also throws if both policies read vectors and only one of them reads auxiliary slots (observed
-  /// numbers that no image shows).
+  /// Creates, on `device`, the teacher of a learner with the configuration `config`. Throws Error naming the teacher's
+  /// file if the teacher reads images. Also throws if both policies read vectors and only one of them reads auxiliary
+  /// slots (observed numbers that no image shows).
   Teacher(const SavedPolicy& saved, const Config& config, Device device);
 
   /// Adds to a simulator's configuration the observation arrays that the teacher reads.

@@ -132,7 +132,7 @@ __device__ inline int warp_inclusive_sum(int value) {
   return value;
 }
 
-// Allocates for a whole warp from a counter, with one atomic addition, and returns the warp's first index in all lanes.
+// Allocates indices for a whole warp from a counter, with one atomic addition, and returns the first in all lanes.
 // end: inclusive prefix sum of the lanes' counts.
 __device__ inline int32_t warp_allocate(int32_t* counter, int end) {
   int32_t first = 0;

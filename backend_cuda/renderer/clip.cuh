@@ -203,7 +203,7 @@ __device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCor
   return fabsf(twice_area) < kMinTwiceArea_px2 ? 0 : edges;
 }
 
-// Clips a face whose corners are distributed over the lanes, as clip_face does.
+// Version of clip_face for a face whose corners are distributed over the lanes.
 __device__ inline void clip(const Frustum& f, ClipShared* storage, WarpFace* face_inout) {
   const int lane = lane_index();
   Vec3 corner = face_inout->corner;
@@ -242,8 +242,8 @@ __device__ inline void clip(const Frustum& f, ClipShared* storage, WarpFace* fac
   face_inout->count = count;
 }
 
-// Makes the screen face of a clipped face whose corners are distributed over the lanes, as make_screen_face does, with
-// edges from edge_begin on.
+// Version of make_screen_face for a clipped face whose corners are distributed over the lanes. Its edges are stored
+// from edge_begin on.
 __device__ inline bool make_screen_face(const FaceSetupContext& context, const WarpFace& face, int32_t edge_begin,
                                         ScreenFace* face_out) {
   const PinholeCamera& camera = context.setting.camera;

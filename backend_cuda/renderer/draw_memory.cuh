@@ -7,13 +7,13 @@
 
 namespace pictura::cuda {
 
-// Blocks of face set-up have one warp each. As many run on an SM as it can hold.
+// Blocks of face set-up have one warp each. An SM runs as many of these blocks as it can hold.
 constexpr int kSetupThreads = 32, kCullBlocksPerProcessor = 32, kFaceSetupBlocksPerProcessor = 32,
               kClipBlocksPerProcessor = 24;
 // Blocks that draw one tile at a time. A tile with more than kDrawFragments fragments is drawn in parts.
 constexpr int kDrawThreads = 256, kDrawBlocksPerProcessor = 4;
 constexpr int kDrawPixels = kTileWidth_px * kTileHeight_px, kDrawFragments = 1152;
-// Few images are deferred, usually none.
+// Few images, usually none, exceed the pool of faces and are deferred.
 constexpr int kDeferredBlocksPerProcessor = 2;
 // Blocks of the last launch.
 constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 16;

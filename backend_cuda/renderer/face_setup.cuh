@@ -102,7 +102,7 @@ __device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad*
   return quad_to_camera(world, setting.camera, &quad_out->in_camera);
 }
 
-// Stores the faces of lanes with at >= 0. Every image has capacity for all of its faces.
+// Stores the face of each lane whose `at` is not negative. Every image has capacity for all of its faces.
 __device__ inline void store_face(const FaceSetupContext& context, const ScreenFace& face, PrimitiveRef primitive,
                                   int32_t edge_begin, int32_t at) {
   if (at >= 0) store_words(context.faces + at, complete_face(face, primitive, edge_begin));

@@ -33,14 +33,14 @@ struct PixelWord {
     constexpr uint32_t kBoundMask = ~0u << kMarkedFaceBits;
     return float_from_bits(static_cast<uint32_t>(mark >> (kFaceBits - kMarkedFaceBits)) & kBoundMask);
   }
-  /// Returns the word with another first fragment of the list and the same face.
+  /// Returns the word with its first fragment replaced and its face kept.
   __device__ static Word with_first(Word word, Word fragment) {
     return kHasFragments | fragment << kFaceBits | (word & kFace);
   }
 };
 
-// Returns the fully covering face of the pixel with the largest occluder bound. kNone if there is no fully covering
-// face, or if it is in the pixel's fragment list.
+// Returns the pixel's fully covering face with the largest occluder bound. Returns kNone if there is no such face, or
+// if the face is in the pixel's fragment list.
 template <typename Memory>
 __device__ typename Memory::Word full_of_word(typename Memory::Word word) {
   return ((word & PixelWord<typename Memory::Word>::kFace) - 1) & Memory::kNone;
@@ -265,9 +265,9 @@ __device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wan
 }
 
 // Makes all effective samples of a fragment visible initially. A fragment that covers its pixel fully may intersect the
-// pixel's full face, which then becomes a fragment too. Lists the pixels to be composited, whose fragments are not
-// alone (is_alone()). Records whether any pixel's remainder may have to be divided: if several fragments cover the
-// pixel fully and another one, no sliver, covers it partly. Hardly any pixel has such fragments.
+// pixel's full face, which then becomes a fragment too. Lists the pixels to be composited: those with fragments that
+// are not alone (is_alone()). Records whether any pixel's remainder may have to be divided: whether several fragments
+// cover the pixel fully, and one that is no sliver covers it partly. Hardly any pixel has such fragments.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;

@@ -34,9 +34,9 @@ __device__ inline RowRange rows_of(const BlockState& state, uint32_t object_id) 
   return rows;
 }
 
-// Adds the weights of a primitive's fragments in the prepared image to a sum per thread: first drawn among all other
-// primitives, then drawn alone. Returns false if the image does not fit into the block's memory. Collective over all
-// threads of the block.
+// Adds the weights of a primitive's fragments in the prepared image to the thread's sums: first with all primitives
+// drawn, then with only this primitive drawn. Returns false if the image does not fit into the block's memory.
+// Collective over all threads of the block.
 __device__ inline bool accumulate_visibility(BlockState* state, uint32_t object_id, VisibilitySum* sum_inout) {
   const RowRange rows = rows_of(*state, object_id);
   const int num_faces = state->num_faces;

@@ -238,7 +238,7 @@ struct DeviceResults {
   }
 };
 
-/// Memory of the phases other than state and results.
+/// Memory of the phases, except state and results.
 struct DeviceScratch {
   DeviceBuffer<RuleOptions> options;
   DeviceBuffer<WorldView> worlds, next_worlds;

@@ -13,7 +13,7 @@ constexpr int kThreadsPerAgent = 8, kWarp = 32;
 /// A world's memory for spawning. A try is a candidate place of a box.
 struct WorldScratch {
   AgentBox* try_boxes = nullptr;   // [boxes, kSpawnTries] boxes of the free tries
-  uint32_t* free_tries = nullptr;  // [boxes] bits of the known tries that are clear of all placed boxes
+  uint32_t* free_tries = nullptr;  // [boxes] bit t is 1 if try t is known to be permitted and to touch no placed box
   int32_t* known_tries = nullptr;  // [boxes] number of evaluated tries
   int32_t* chosen_try = nullptr;   // [boxes] chosen try; -1: none
   int32_t* next_try = nullptr;     // [boxes] choice in the current round; -1: none

@@ -15,7 +15,7 @@ struct CheckCommands {
   template <typename Atomics>
   PICTURA_HD void operator()(const Atomics& atomics, int slot) const {
     const WorldView world = arrays.world(arrays.world_of_slot[slot]);
-    if (slot == world.first_slot) arrays.began[world.index] = 0;  // arrays.prepares has the value
+    if (slot == world.first_slot) arrays.began[world.index] = 0;  // arrays.prepares has a copy of the old value
     if (arrays.episode_over[world.index] || accepts(world, slot - world.first_slot, commands[slot])) return;
     atomics.lower(arrays.rejected_slot, slot);
   }

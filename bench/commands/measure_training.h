@@ -27,8 +27,8 @@ struct TrainingMeasurement {
 };
 
 /// Trains in a temporary folder. The learning rate stays constant, so that no schedule ends. Throws Error if an update
-/// took no agent-step or no minibatch. Throws Error if the unchanged policy gives actions other probabilities during
-/// learning than during the rollout, because it then got wrong observations. Throws the exceptions of train().
+/// took no agent-step or no minibatch. Throws Error if the unchanged policy computes different probabilities of actions
+/// in learning than in the rollout, because its observations are then wrong. Throws the exceptions of train().
 TrainingMeasurement measure_training(const TrainingCase& training_case);
 
 /// Wall time of an update in seconds, and the part of it that is outside all phases.

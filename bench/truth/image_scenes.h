@@ -13,7 +13,8 @@ namespace pictura {
 void add_polyline(StaticGeometry* geometry, std::vector<Vec3> points_m, float width_m, StripKind kind);
 
 /// A scene with its views. make_synthetic_town() makes a random town: a grid of streets 60 m apart, crosswalks and
-/// lights at crossings, walls along blocks, and on the streets, num_agents agents that do not touch each other.
+/// lights at crossings, walls along blocks, and num_agents agents, which stand on the streets without touching each
+/// other.
 struct Snapshot {
   StaticGeometry geometry;
   SceneOwner scene;  // one world with handle 0
@@ -53,7 +54,7 @@ Rig simple_rig(int width_px = 100, int height_px = 100, float focal_px = 50);
 /// Returns a rig of the first camera of paper_rig().
 Rig front_rig(int width_px = 96, int height_px = 54);
 
-/// Returns four cameras of 97x55, 1x1 and 40x130 pixels.
+/// Returns four cameras: two of 97x55 pixels, one of 1x1 and one of 40x130.
 Rig mixed_rig();
 
 /// Returns eight cameras of eight sizes, with different pitch and roll angles.

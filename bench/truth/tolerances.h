@@ -38,8 +38,8 @@ constexpr double kSilhouetteError = 3e-4;
 /// Maximum channel difference between a line of two pieces and the same line of one piece. The common edge of the
 /// pieces splits pixels exactly, and the ends of the pieces are rounded to 1e-5 px.
 constexpr double kSplitLineError = 1e-4;
-/// Tolerances of the CUDA renderer against the oracle, as the design requires. The target is 0. kKernelShareWithin of
-/// all values must have an error of at most kKernelError.
+/// Tolerances of the CUDA renderer against the oracle, as the design requires. The target is 0. At least the share
+/// kKernelShareWithin of all values must have an error of at most kKernelError.
 constexpr double kKernelError = 1.0 / 255;
 constexpr double kKernelShareWithin = 0.9999;
 constexpr double kKernelWorstError = 4.0 / 255;

@@ -67,9 +67,9 @@ PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_insid
 /// Maximum number of corners that widen_in_front() emits.
 constexpr int kMaxWidenedCorners = 5;
 /// Widens a strip in camera coordinates to at least floor_px on screen. If the strip crosses the near plane, it is cut
-/// there, and only its far end is widened: sides moved as a whole would deviate from the strip near the camera. Calls
-/// emit(i, corner) for i = 0, 1, ... and returns the number of corners. For other faces, floor_px is 0 and the corners
-/// do not change.
+/// there, and only its far end is widened: if whole sides moved, they would deviate from the strip near the camera.
+/// Calls emit(i, corner) for i = 0, 1, ... and returns the number of corners. For other faces, floor_px is 0 and the
+/// corners do not change.
 template <typename Emit>
 PICTURA_HD inline int widen_in_front(const PinholeCamera& camera, float floor_px, const Vec3* corners, Emit&& emit) {
   Vec3 widened[4];

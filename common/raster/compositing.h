@@ -25,8 +25,8 @@ class PixelAccumulator {
     PICTURA_HD float of(Weight weight) const { return weight.area * of_kind[weight.kind]; }
   };
 
-  /// Weight of a fragment. `visible` are the samples of effective_samples() that no other fragment occludes; a sliver's
-  /// are all 64.
+  /// Weight of a fragment. `visible` are the samples of effective_samples() (all 64 for a sliver) that no other
+  /// fragment occludes.
   PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, uint64_t visible) {
     const uint64_t samples = effective_samples(coverage);
     const float share = static_cast<float>(popcount(visible)) / static_cast<float>(popcount(samples));

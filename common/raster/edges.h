@@ -45,8 +45,8 @@ constexpr int kSampleColumns = kInt16x8Size, kSampleRows = 8;
 /// Sample tests use heights as 16-bit integers, kRowUnits per row, relative to the pixel's centre. In the first column
 /// right of the centre, a line's height is clamped to +-kLines_rows / 2; per column, it changes by at most kSteepest
 /// rows. So a clamped line does not cross the pixel, and 16 bits do not overflow. Steeper lines get the slope
-/// kSteepest, so that they cross a column over some 8 rows. An upright line would otherwise include all samples of a
-/// column or none, which would quantize areas to eighths of the pixel.
+/// kSteepest, so that they cross the pixel's 8 rows within the width of one column. An upright line would otherwise
+/// include all samples of a column or none, which would quantize areas to eighths of the pixel.
 constexpr int kRowUnits = 128;
 constexpr float kLines_rows = 256.0f, kSteepest = 9.0f;
 
@@ -66,9 +66,9 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   // crosses the height of the centre at the same x.
   const float shrink = is_level ? 1.0f : min_of(kSteepest * fabsf(dx_dy), 1.0f);
   const float scale = shrink * (0.5f * kSampleRows / kLines_rows), step_rows = shrink * edge.dy_dx;
-  // rows_scale and rows_offset map the sum of two heights to the height in the first column right of the centre, as a
-  // fraction of kLines_rows; 0.5 is the pixel's centre. The line crosses the pixel's left and right sides at these two
-  // heights, in pixels from the pixel's top.
+  // rows_scale and rows_offset map the sum of the line's heights at the pixel's left and right sides to its height in
+  // the first column right of the centre, as a fraction of kLines_rows; 0.5 is the pixel's centre. The heights at the
+  // sides are in pixels from the pixel's top.
   edge.rows_scale = (dx > 0.0f) == downward ? scale : -scale;
   edge.rows_offset = 0.5f - scale + step_rows * (0.5f / kLines_rows);
   edge.rows_step = static_cast<int32_t>(floorf(step_rows * kRowUnits + 0.5f));

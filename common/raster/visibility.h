@@ -187,8 +187,8 @@ PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec
   const bool first = are_equal_depths(inverse_depth_a, inverse_depth_b) ? a.object_id < b.object_id
                                                                         : inverse_depth_a > inverse_depth_b;
   if (strip_a == strip_b) return first;
-  // By depth, the solid is beneath the strip. If the solid stands on the strip, it only cuts into the road, and the
-  // order is reversed.
+  // Judged by depth, the solid is beneath the strip. If the solid stands on the strip, it only cuts into the road, and
+  // the order is reversed.
   const bool is_strip_first = first == strip_a, is_from_below = is_strip_from_below(strip_a ? a : b);
   if (is_strip_first == is_from_below) return first;
   return stands(strip_a ? b.object_id : a.object_id, strip_a ? a.object_id : b.object_id) ? !first : first;

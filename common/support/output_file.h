@@ -38,10 +38,10 @@ bool is_temporary_name(std::string_view name);
 
 class OutputFile {
  public:
-  /// Opens a path for writing, and follows links. A target that is not a regular file (a device, a FIFO), or that a
-  /// link in /proc refers to (such as /dev/stdout), is never replaced: commit() writes into it. If a regular file is
-  /// replaced, the new file gets its mode and, where possible, its owner. Throws Error for folders, read-only files and
-  /// other targets that cannot be written; the message names the path.
+  /// Opens a path for writing, and follows links. A target that is not a regular file (a device, a FIFO), or that is
+  /// reached by a link in /proc (as through /dev/stdout), is never replaced: commit() writes into it. If a regular file
+  /// is replaced, the new file gets its mode and, where possible, its owner. Throws Error for folders, read-only files
+  /// and other targets that cannot be written; the message names the path.
   explicit OutputFile(const std::string& path, Staging staging = Staging::unnamed);
   /// Leaves the target unchanged unless commit() was called.
   ~OutputFile();

@@ -48,8 +48,8 @@ void visit_options(CornerOptions& options, Visitor&& v) {
 /// Drives evaluation worlds as probe_removal() does, or with options.worlds.controller in all worlds. Searches the
 /// states of these worlds for egos (vehicles that policies take over) before blind corners, see find_corner_states(). A
 /// state with a hidden vehicle is kept if that vehicle enters the junction within kTakeoverSteps and the ego sees no
-/// part of it. Renderer::visibility decides this, in the cameras of the first policy that reads images, or in the
-/// paper's cameras if no policy reads images. All states, with and without a hidden vehicle, are kept only if their
+/// part of the vehicle. Renderer::visibility decides this, in the cameras of the first policy that reads images, or in
+/// the paper's cameras if no policy reads images. All states, with and without a hidden vehicle, are kept only if their
 /// scene lasts kTakeoverSteps more steps. Each pair of match_corners() is a state with a hidden vehicle and a similar
 /// state without one. Each policy then drives the ego for kTakeoverSteps (TakeoverWorlds) from three states: the state
 /// with the hidden vehicle, this state after removal of the vehicle, and the similar state. Each run takes place in a

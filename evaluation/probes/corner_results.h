@@ -57,8 +57,8 @@ struct CornerResults : ProbeResults {
 };
 
 /// Reveal of a run: the step at which the ego's line of sight opens to the hidden vehicle, or to the place where the
-/// removed vehicle would be. At an empty corner, it is the step of the reveal in the same policy's run from the pair's
-/// hidden state.
+/// removed vehicle would be. In a run at an empty corner, the reveal is at the same step as in the same policy's run
+/// from the pair's state with a hidden vehicle.
 struct Reveal {
   int32_t step = 0;
   std::optional<float> distance_m;  // from ego to hidden vehicle, between the boxes' centres
@@ -100,8 +100,8 @@ struct CornerRow {
 };
 
 /// Returns the rows of runs with walls, then of runs without walls. Each half has three kinds of rows: one row per
-/// policy and case; differences of each further policy from the first policy; and each policy's differences hidden
-/// minus removed and hidden minus empty.
+/// policy and case; differences of each further policy from the first policy; and each policy's differences between
+/// cases (hidden minus removed, and hidden minus empty).
 std::vector<CornerRow> summarize(const CornerResults& results);
 
 /// Writes a CSV file with a header and a row for each run. Throws Error naming the path.

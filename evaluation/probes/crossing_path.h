@@ -1,5 +1,5 @@
-// Straight paths on which a pedestrian could emerge from behind a vehicle in a frozen state. On the used part of a path
-// the pedestrian is hidden, then seen, then hidden again. Includes no torch headers.
+// Straight paths, in a frozen state, on which a pedestrian could emerge from behind a vehicle. On the used part of a
+// path the pedestrian is hidden, then seen, then hidden again. Includes no torch headers.
 #pragma once
 
 #include <optional>

@@ -38,13 +38,13 @@ void visit_options(PedestrianOptions& options, Visitor&& v) {
 
 /// Drives evaluation worlds as probe_removal() does, and searches their states for paths. A path needs an ego, which is
 /// an active vehicle, and a hider, which is a vehicle or parked car ahead of the ego within hider_range_m. The path is
-/// one of paths_behind() the hider. Along the path a pedestrian is first wholly hidden by the hider, then seen, and
-/// then wholly hidden again (usable_part()). The pedestrian is placed on each point of the path in the otherwise
-/// unchanged state. Each policy gets its input with and without the pedestrian: vectors from Simulator::observe, images
-/// from a scene with the pedestrian's box. Visibility is measured in the cameras of the first policy that reads images,
-/// or in the paper's cameras if no policy reads images. An interrupt ends the probe with the completed cases. Throws
-/// UsageError if the number of scenes is not a multiple of the number of policies. Throws Error naming file and key for
-/// bad input.
+/// one of those that paths_behind() returns for the hider. Along the path a pedestrian is first wholly hidden by the
+/// hider, then seen, and then wholly hidden again (usable_part()). The pedestrian is placed on each point of the path
+/// in the otherwise unchanged state. Each policy gets its input with and without the pedestrian: vectors from
+/// Simulator::observe, images from a scene with the pedestrian's box. Visibility is measured in the cameras of the
+/// first policy that reads images, or in the paper's cameras if no policy reads images. An interrupt ends the probe
+/// with the completed cases. Throws UsageError if the number of scenes is not a multiple of the number of policies.
+/// Throws Error naming file and key for bad input.
 PedestrianResults probe_pedestrian(const PedestrianOptions& options);
 /// Probes policies that are already open on one device, with their renderers and cameras. options.policies holds their
 /// names.

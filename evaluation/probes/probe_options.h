@@ -52,7 +52,7 @@ void visit_options(ProbeOptions& probe, Visitor&& v) {
 }
 
 /// Number of cases in every pass through a network. A case has two inputs: with and without its road user. They take
-/// the same row of two passes, so that equal inputs give bit-identical outputs.
+/// the same row in two separate passes, so that equal inputs give bit-identical outputs.
 constexpr int probe_pass(Device device) { return device.is_host() ? 256 : 2048; }
 
 /// Returns the default number of scenes: each policy drives equally many on each map, and each map has two scenes or

@@ -59,8 +59,8 @@ struct KeptScene {
 
   /// Adds a world, followed by inserted boxes.
   void add_world(const ProbeFrame& frame, size_t world, Span<const InsertedBox> inserted = {});
-  /// Return the index in this scene of a box of the last added world: the frame's box `box_of_frame`, or the first
-  /// inserted box.
+  /// Return the scene's index of a box in the last added world: the frame's box `box_of_frame`, or the first inserted
+  /// box.
   int32_t box_of(const ProbeFrame& frame, size_t world, int32_t box_of_frame) const {
     return box_of_frame - frame.box_begin[world] + world_begin[geometry.size() - 1];
   }
@@ -116,7 +116,7 @@ class ProbeRun final : public EvaluationObserver {
   /// Drives all scenes: each policy drives its share, or options.worlds.controller drives all. Passes the worlds'
   /// states to `sample` after every sample_steps steps. Finally evaluates the remaining pairs, and returns the
   /// visibility of every pair's measured_box, in the order of add_pairs(). If `watch` is given, only the driver's
-  /// simulator runs, none for other policies' observations, and add_pairs() must not be called.
+  /// simulator runs, without simulators for other policies' observations, and add_pairs() must not be called.
   std::vector<float> run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch = {});
 
   /// Adds pairs of the current frame. Their responses are appended to the results in the order of the pairs.

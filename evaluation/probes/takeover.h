@@ -33,7 +33,7 @@ struct TakeoverStart {
   int32_t removed = -1;               // removed agent; -1: none
 };
 
-/// One run of one policy. Element k is the value after k steps; NaN after the end of the run.
+/// One run of one policy. Element k of an array is the value after k steps; NaN after the end of the run.
 struct Takeover {
   int32_t steps = 0;     // steps that the ego drove: kTakeoverSteps, or fewer if an infraction ended the run
   uint8_t ended_by = 0;  // Event bits of the infraction that ended the run

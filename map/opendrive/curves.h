@@ -44,7 +44,8 @@ struct Station {
   double elevation_m = 0;
 };
 
-/// Cache of the direction of the last heading. It is effective on straight lines, along which the heading is constant.
+/// Cache of the unit vector of the last heading. It is effective on straight lines, along which the heading is
+/// constant.
 class LastDirection {
  public:
   /// Returns (cos, sin) of the heading.

@@ -91,8 +91,8 @@ class Element {
 // Maximum difference of stations that count as equal.
 inline constexpr double kStationTolerance_m = 1e-3;
 
-/// Reads the station in `attribute`, from which a record applies. It should be in [0, length]. Repairs: a record before
-/// the start applies from the start. A record beyond the end is omitted; nullopt is returned for it. A missing
+/// Reads from `attribute` the station from which a record applies. It should be in [0, length]. Repairs: a record
+/// before the start applies from the start. A record beyond the end is omitted; nullopt is returned for it. A missing
 /// attribute counts as `fallback` if there is one.
 std::optional<double> read_station(const Element& record, const char* attribute, double length,
                                    std::optional<double> fallback = std::nullopt);

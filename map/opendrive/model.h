@@ -106,7 +106,7 @@ struct RoadMark {
   MarkColor color = MarkColor::white;
   double width = 0;                           // 0: the file gives no width
   LaneChange lane_change = LaneChange::both;  // permitted directions of lane changes across the mark
-  std::vector<MarkLine> lines;                // repeated along the mark; replace the pattern of `type`
+  std::vector<MarkLine> lines;                // repeated along the mark, in place of the pattern of `type`
   std::vector<MarkLine> explicit_lines;       // painted once each
   Profile sway;  // shift of the lines to the left, as a function of s minus the mark's start
   SourceLocation where;

@@ -30,8 +30,8 @@ void read_road_links(const Element& road_element, FileRoad* road);
 FileJunction read_junction(const Element& element);
 FileController read_controller(const Element& element);
 
-/// Reads the attributes max and unit of a <speed>, and returns the limit in m/s, or 0 for no limit. Repair: an
-/// unreadable speed returns nullopt.
+/// Reads the attributes max and unit of a <speed>, and returns the limit in m/s, or 0 for no limit. Repair: returns
+/// nullopt for an unreadable speed.
 std::optional<double> read_speed_mps(const Element& element);
 
 }  // namespace pictura::opendrive

@@ -8,8 +8,8 @@
 namespace pictura::opendrive {
 
 /// Parses and checks `text`, and applies the header's offset. `text` must outlive `network_out`. Repairs faults that
-/// have only one sensible meaning. For other faults (in strict reading, for all) throws Error, which names source,
-/// line, owner and element.
+/// have only one sensible meaning. Throws Error, which names source, line, owner and element, for other faults (in
+/// strict reading, for all).
 void read_network(std::string_view text, const std::string& source_name, Faults* faults, Network* network_out);
 
 }  // namespace pictura::opendrive

@@ -13,7 +13,7 @@ inline constexpr double kVerticalCurveFraction = 0.25;
 /// Maximum height difference of a street of this length.
 inline double max_climb_m(double length_m) { return kMaxGrade * (1 - kVerticalCurveFraction) * length_m; }
 
-/// Returns a profile from one height to another that is level at both ends: a parabola, a constant grade, a parabola.
+/// Returns a profile that is level at both ends, from one height to another: a parabola, a constant grade, a parabola.
 inline opendrive::Profile elevation_profile(double from_m, double to_m, double length_m) {
   if (from_m == to_m) return {{{0, from_m, 0, 0, 0}}};
   const double curve = kVerticalCurveFraction * length_m;

@@ -11,7 +11,7 @@
 namespace pictura::town {
 
 // Dimensions of streets.
-inline constexpr double kMinStreetRadius_m = 30;  // curves may be tighter next to a fifth arm
+inline constexpr double kMinStreetRadius_m = 30;  // curves may be tighter next to the fifth arm of a crossing
 inline constexpr double kShoulderWidth_m = 0.5, kSidewalkWidth_m = 2.5, kParkingWidth_m = 2.3, kHalfMedian_m = 1;
 
 /// Eight directions of arms, counter-clockwise from east. Streets of the grid have even directions, and diagonals have
@@ -86,8 +86,8 @@ inline Pose mouth_pose(const Node& node, const Arm& arm, const Street& street, d
   return offset_right(on_ray, arm.at_start ? street.start_offset_m : -street.end_offset_m);
 }
 
-/// Radius of the left border of a right turn between arms at the angle `gap_rad`. The turn is wide, but so close to the
-/// corner that no gap in the road surface remains between the turn and the other lanes of the junction.
+/// Radius of the left border of a right turn between two arms whose headings differ by `gap_rad`. The turn is wide, but
+/// so close to the corner that no gap in the road surface remains between the turn and the other lanes of the junction.
 double right_turn_radius_m(double gap_rad, double lane_width_m);
 
 class Layout {

@@ -52,7 +52,7 @@ class TownBuilder {
   int add_road(Curve curve, double height_m, const std::string& junction, double speed_mps, const Side& left,
                const Side& right, const SectionStyle& style);
   EndSides& sides_at(RoadEnd end) { return end_sides_[2 * end.road + (end.at_start ? 0 : 1)]; }
-  /// Returns the side of a road at one of its ends, for traffic that arrives there or leaves.
+  /// Returns the side of a road on which traffic arrives at this end (if `arriving`) or leaves it.
   const Side& side(RoadEnd end, bool arriving) {
     return arriving == end.at_start ? sides_at(end).left : sides_at(end).right;
   }

@@ -25,15 +25,15 @@ struct TownOptions {
   double max_lanes = 3;            // maximum number of lanes in each direction of avenues and the ring road
   double ring_road = 1;            // probability that an avenue runs around the town
   double motorway = 0;             // probability that a motorway runs around the town
-  double slip_lanes = 0.1;   // fraction of right turns at lights that have slip lanes, if their streets are long enough
-  double lane_spread_m = 0;  // maximum deviation of the width of the town's lanes from 3.5 m
-  double hills_m = 6;        // maximum height difference, before grades are limited
-  double overpasses = 0.1;   // fraction of overpasses among the inner crossings with four arms
-  double crosswalks = 0.9;   // fraction of the crossings that have crosswalks
-  double sidewalks = 0.95;   // fraction of the streets that have sidewalks
-  double parking = 0.4;      // fraction of sides with parking bays, among the sides of single-lane streets
-  double lights = 0.8;       // fraction of the crossings (except roundabouts) that have lights
-  double far_side = 0.5;     // fraction of crossings with lights where the heads are beyond the junction
+  double slip_lanes = 0.1;         // fraction of slip lanes among right turns at lights, if the streets are long enough
+  double lane_spread_m = 0;        // maximum deviation of the width of the town's lanes from 3.5 m
+  double hills_m = 6;              // maximum height difference, before grades are limited
+  double overpasses = 0.1;         // fraction of overpasses among the inner crossings with four arms
+  double crosswalks = 0.9;         // fraction of the crossings that have crosswalks
+  double sidewalks = 0.95;         // fraction of the streets that have sidewalks
+  double parking = 0.4;            // fraction of sides with parking bays, among the sides of single-lane streets
+  double lights = 0.8;             // fraction of the crossings (except roundabouts) that have lights
+  double far_side = 0.5;           // fraction with heads beyond the junction, among crossings with lights
 };
 
 /// A numeric option of towns: its name in commands and map names, its range [low, high] and its help text.

@@ -1,7 +1,7 @@
-// Importer of PufferDrive's binary scenes. No layout has a magic number or a version, so the importer tries each layout
-// and takes the one that fits the file to the last byte. Supported layouts are v1 (of 2025), v2 (of PufferDrive 2.0,
-// with or without a leading scenario id) and v3c (of PufferDrive 3.0, and of 123Drive from version 0.3 on). All are
-// little-endian.
+// Importer of PufferDrive's binary scenes. Their layouts have no magic number or version, so the importer tries each
+// layout and takes the one that fits the file to the last byte. Supported layouts are v1 (of 2025), v2 (of PufferDrive
+// 2.0, with or without a leading scenario id) and v3c (of PufferDrive 3.0, and of 123Drive from version 0.3 on). All
+// are little-endian.
 #pragma once
 
 #include <string>

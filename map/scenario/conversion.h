@@ -1,5 +1,6 @@
-// Stages of make_scenario(), which converts a recorded scene to a scenario, in the order of execution. Each stage fills
-// its own parts of the scenario, and may read parts of earlier stages. docs/reference/scenario.md lists the rules.
+// Stages, in the order of execution, of make_scenario(), which converts a recorded scene to a scenario. Each stage
+// fills its own parts of the scenario, and may read parts of earlier stages. docs/reference/scenario.md lists the
+// rules.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +35,7 @@ struct Conversion {
     if (remaining_work < 0) fail("{}: its map exceeds the work limit of a scene", scene.source);
   }
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const { return p - origin; }
-  /// If a program wrote the scene (is_authored), rounds a point to the precision of a map. So scene_of_scenario() later
+  /// Rounds a point to the precision of a map if a program wrote the scene (is_authored). So scene_of_scenario() later
   /// returns the same point.
   Eigen::Vector3d rounded(const Eigen::Vector3d& p) const {
     if (!scene.is_authored) return p;

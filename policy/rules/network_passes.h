@@ -149,7 +149,7 @@ class NetworkPasses {
                                        Stream stream) = 0;
 
   /// Computes out = layer norm of (x + position) over channels, with an epsilon of 1e-5. weight, bias: [channels].
-  /// position: [period, channels], where row r uses position r % period; null for none, with period 1.
+  /// position: [period, channels], where row r uses position r % period. Without positions, it is null and period is 1.
   virtual void norm(const ActivationSize& size, const void* x, const void* position, int64_t period,
                     const float* weight, const float* bias, void* out, Stream stream) = 0;
   /// Computes the gradient of x, and the gradients of position, weight and bias as partial sums [num_norm_sums(rows,

@@ -16,8 +16,8 @@ struct DrivingKeys {
   bool operator==(const DrivingKeys&) const = default;
 };
 
-/// Returns the action that brings the accelerations of the agent in `slot` nearest to those that the keys request,
-/// after a step of dt_s.
+/// Returns the action that, after a step of dt_s, brings the accelerations of the agent in `slot` nearest to those that
+/// the keys request.
 int32_t action_of_keys(const DrivingKeys& keys, const AgentStateView& state, int slot, float dt_s);
 
 }  // namespace pictura

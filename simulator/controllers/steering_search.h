@@ -19,11 +19,11 @@ struct DrivingPlan {
   bool is_clear = false;         // the plan stays on the road up to the horizon or an exit
 };
 
-/// Finds the cheapest plan along the path from the agent's current motion at point `place` of the path. Deviations from
-/// the path and driving near the edge of the road have a cost. The algorithm is hybrid A* without a heuristic (Dolgov
-/// et al., Path planning for autonomous vehicles in unknown semi-structured environments, 2010): motions are exact, and
-/// of several similar motions only one is kept. *nodes_left_inout is the budget of nodes; the search subtracts the
-/// number of nodes that it used. If no clear plan is found, the result is the plan that stays on the road longest.
+/// Finds the cheapest plan along the path, from the agent's current motion near point `place`. Deviations from the path
+/// and driving near the edge of the road have a cost. The algorithm is hybrid A* without a heuristic (Dolgov et al.,
+/// Path planning for autonomous vehicles in unknown semi-structured environments, 2010): motions are exact, and of
+/// several similar motions only one is kept. *nodes_left_inout is the budget of nodes; the search subtracts the number
+/// of nodes that it used. If no clear plan is found, the result is the plan that stays on the road longest.
 DrivingPlan search_steering(const DrivenAgent& agent, const std::vector<PathPoint>& path, size_t place,
                             size_t* nodes_left_inout);
 

@@ -77,10 +77,10 @@ PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, con
 }
 
 /// Whether an agent is at fault for a collision (paper). An agent is not at fault if it is almost at rest or is struck
-/// from behind. A reversing agent is never struck from behind. Any other agent is struck from behind if, before the
-/// step, the nearer end of the other box was behind the plane of the agent's rear bumper. The nearer end is the middle
-/// of the other box's front or rear, whichever is farther forward as seen from the agent. own_speed_mps is the agent's
-/// speed in the step.
+/// from behind. A reversing agent is never struck from behind. An agent that drives forward is struck from behind if,
+/// before the step, the nearer end of the other box was behind the plane of the agent's rear bumper. The nearer end is
+/// the middle of the other box's front or rear, whichever is farther forward as seen from the agent. own_speed_mps is
+/// the agent's speed in the step.
 PICTURA_HD inline bool at_fault(const AgentBox& own_before, float own_speed_mps, const AgentBox& other_before) {
   constexpr float kStopped_mps = 0.2f;
   if (fabsf(own_speed_mps) < kStopped_mps) return false;

@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// Returns the first field of an agent with an invalid value, or `none`.
+/// Returns an agent's first field with an invalid value, or `none`.
 PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions& options, const AgentStateView& agents,
                                            int slot) {
 #define X(name, type, per_agent, first, comment)                                                      \

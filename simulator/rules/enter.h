@@ -22,8 +22,8 @@ PICTURA_HD inline const Entry& drawn_entry(const WorldView& world, int agent, in
   return world.map.entries[random.below(static_cast<int>(world.map.entries.size()))];
 }
 
-/// Returns the point distance_m ahead on the route that takes the first successor of each lane, or the end of the
-/// route's last lane.
+/// Returns the point distance_m ahead on the route that takes the first successor of each lane; if the route is
+/// shorter, its end.
 PICTURA_HD inline RoutePoint point_ahead(const MapView& map, RoutePoint at, float distance_m) {
   constexpr int kMaxLanesAhead = 64;  // a safety bound
   at.s_m += distance_m;

@@ -29,9 +29,9 @@ PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& co
   return is_valid(command) && (has_record(world.map) || !is_follow_record_command(command));
 }
 
-/// Whether a step of the agent is counted and used for learning. The agent must take actions, and the command must
-/// neither be to leave nor to follow the record. In this episode, the agent must neither be impaired nor driven by
-/// another policy.
+/// Whether a step of the agent is counted and used for learning. The agent must take actions, and the command must be
+/// neither to leave nor to follow the record. In this episode, the agent must be neither impaired nor driven by another
+/// policy.
 template <typename CommandType>
 PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType& command) {
   return takes_actions(world, agent) && !is_leave_command(command) && !is_follow_record_command(command) &&

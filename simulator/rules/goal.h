@@ -62,7 +62,7 @@ PICTURA_HD inline RoutePoint advance_along_lanes(const MapView& map, RoutePoint 
   return {at.lane, map.lanes[at.lane].length_m};
 }
 
-/// Returns the next waypoint of a route: a lane change with probability kLaneChangeChance, then a random gap ahead.
+/// Returns the next waypoint of a route: a random gap ahead, after a lane change with probability kLaneChangeChance.
 PICTURA_HD inline RoutePoint next_waypoint(const MapView& map, RoutePoint at, RandomStream* random_inout) {
   const float gap_m = random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m);
   const float change = random_inout->uniform();

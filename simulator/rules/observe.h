@@ -31,7 +31,7 @@ PICTURA_HD inline void observe_ego(const WorldView& world, int slot, float* out)
 
 /// Writes the observed conditioning. It is scaled by the paper's training ranges (conditioning_scale), not by those of
 /// the run, so that equal coefficients are observed equally in all runs. Coefficients that the paper does not vary are
-/// observed as 0. Values below the range, which pedestrians have, are clamped to -2.
+/// observed as 0. Coefficients of pedestrians may be below the range; they are observed as at least -2.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* out, const ThreadGroup& group = {}) {
   for (int i = group.rank(); i < kNumConditioning; i += group.size()) {
@@ -214,7 +214,7 @@ PICTURA_HD inline bool observes(const WorldView& world, int agent) {
          (world.agents.events[world.first_slot + agent] & kInfractions) != 0;
 }
 
-/// Whether the agent's entity set may be nonempty. `hidden` is hidden_from() the agent.
+/// Whether the agent's entity set may be nonempty. `hidden` must be the result of hidden_from().
 PICTURA_HD inline bool observes_set(const WorldView& world, int agent, EntitySet set, Hides hidden) {
   const bool is_hidden =
       (set == EntitySet::partners && hidden == kHidesAgents) || (set == EntitySet::controls && hidden == kHidesLights);

@@ -14,7 +14,7 @@ PICTURA_HD inline LanePose pose_on_walk(const MapView& map, int32_t piece_index,
   return {{xy.x, xy.y, height_on(piece, along)}, piece.heading_rad};
 }
 
-/// Returns the next piece of a random route after a piece. All pieces that leave its end, except the way back, are
+/// Returns the piece that follows a piece on a random route. All pieces that leave its end, except the way back, are
 /// equally likely. At a dead end, returns the way back.
 PICTURA_HD inline int32_t choose_way(const MapView& map, int32_t piece_index, RandomStream* random_inout) {
   const WalkPiece& piece = map.walk_pieces[piece_index];

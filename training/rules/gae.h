@@ -27,8 +27,8 @@ struct GaeTail {
 };
 
 /// Returns the advantage of a step's decision; 0 if the step has no decision. tail_inout: on entry the tail after this
-/// step, on return the tail after the previous step. Each step discounts by gamma, each decision by gae_lambda. An
-/// action held for k steps returns the sum of gamma^i r_i and bootstraps with gamma^k.
+/// step, on return the tail after the previous step. Each step discounts by gamma, each decision by gae_lambda. The
+/// return of an action held for k steps is the sum of gamma^i r_i, bootstrapped with gamma^k.
 PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float gamma, float gae_lambda,
                                       GaeTail* tail_inout) {
   const bool goes_on = !transition.is_terminated && !transition.is_truncated;

@@ -1,5 +1,4 @@
-// Rows of entity sets, computed eight floats at a time: transformation to the ego frame, times the scales of the
-// features.
+// Rows of entity sets, computed eight floats at a time: they are transformed to the ego frame, then scaled.
 #pragma once
 
 #include "pictura/common/portable/float8.h"
@@ -41,7 +40,7 @@ static_assert(offsetof(StopLine, right_m) == 3 * sizeof(float) && sizeof(StopLin
 
 // Functions without a Float8 parameter do not return a Float8. A program may contain code for two different types
 // Float8, and a function's mangled name contains the types of its parameters, but not its return type. The linker could
-// not tell such functions apart.
+// not tell apart functions that differ only in the type Float8 that they return.
 
 /// Writes the row of a partner.
 PICTURA_HD inline void write_partner(const AgentBox& box, float speed_mps, const RowFrame& frame, float* row_out) {
