@@ -1,5 +1,6 @@
 // Batches of images. ImageBatch refers to memory of the caller, and HostImages owns host memory. Only image_layout()
-// computes where images are in memory. Images have no padding.
+// computes where images are in memory. There are no gaps between or within images, except that patches may extend
+// beyond an image.
 #pragma once
 
 #include <cstdint>

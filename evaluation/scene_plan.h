@@ -9,8 +9,8 @@
 
 namespace pictura {
 
-/// Adapts a scene to a protocol: scales its boxes, and replaces first headings (SceneProtocol::max_first_turn_deg).
-/// Throws Error if the scene's time step is not 0.1 s.
+/// Adapts a scene to a protocol: scales its boxes, and replaces a track's first heading by its second if they differ
+/// too much (SceneProtocol::max_first_turn_deg). Throws Error if the scene's time step is not 0.1 s.
 std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const SceneProtocol& protocol);
 
 /// Selects the tracks that thinning removes; 1: removed, [tracks]. Thinning removes round((1 - density) n) of the n

@@ -1,5 +1,5 @@
-// Results of evaluated vehicles in recorded scenes (by road user, by scene and over all scenes), and files from which
-// parts of an evaluation are merged. Includes no torch headers.
+// Results of evaluated vehicles in recorded scenes (by road user, by scene and over all scenes). Results can be saved
+// in files and merged. Includes no torch headers.
 #pragma once
 
 #include <cstdint>

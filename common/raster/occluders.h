@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// The face of a wall or box on screen, entirely in front of the near plane. Aligned for wide loads.
+/// The face of a wall or box on screen, entirely beyond the near plane. Aligned for wide loads.
 struct alignas(16) Occluder {
   Vec3 side[4];        // distance in px from each side, positive inside: factors of x and y, constant term
   Vec3 inverse_depth;  // inverse depth of the occluder's plane: factors of x and y, constant term
@@ -23,7 +23,7 @@ PICTURA_HD inline bool may_occlude(const WallFace& wall, const PinholeCamera& ca
   return to_camera(camera, wall_middle(wall)).z - wall_radius_m(wall) < kOccluderRange_m;
 }
 
-/// Twice the minimum area of an occluder, and the length below which a side does not bound the occluder.
+/// Twice the minimum area of an occluder, and the minimum length by which the normals of its sides are divided.
 constexpr float kMinOccluder_px2 = 1.0f, kMinSide_px = 1e-3f;
 /// Maximum distance of an occluder's corners from the image; beyond it, precision is too low.
 constexpr float kMaxOccluder_px = 4096.0f;

@@ -24,8 +24,9 @@ constexpr int kMaxThreads = 1024;
 int resolve_num_threads(int num_threads);
 
 /// Calls call(body, number) in this thread with number 0, and concurrently in up to num_threads - 1 other threads with
-/// distinct numbers below num_threads. When this thread's call ends, waits only for threads that have begun, because
-/// other processes may occupy the processors of the others. Nested calls run in this thread alone.
+/// distinct numbers below num_threads. When this thread's call ends, waits only for threads that have begun: the
+/// remaining threads may have to wait for processors that other processes occupy. Nested calls run in this thread
+/// alone.
 void run_on_threads(int num_threads, void (*call)(void* body, int number), void* body);
 
 /// Calls body(i), or body(i, thread) with the thread's number below num_threads, for i in [0, count), on at most

@@ -46,16 +46,16 @@ void visit_options(CornerOptions& options, Visitor&& v) {
 }
 
 /// Drives evaluation worlds as probe_removal() does, or with options.worlds.controller in all worlds. Searches the
-/// states of these worlds for egos (vehicles that policies take over) before blind corners, see find_corner_states(). A
-/// state with a hidden vehicle is kept if that vehicle enters the junction within kTakeoverSteps and the ego sees no
-/// part of the vehicle. Renderer::visibility decides this, in the cameras of the first policy that reads images, or in
-/// the paper's cameras if no policy reads images. All states, with and without a hidden vehicle, are kept only if their
-/// scene lasts kTakeoverSteps more steps. Each pair of match_corners() is a state with a hidden vehicle and a similar
-/// state without one. Each policy then drives the ego for kTakeoverSteps (TakeoverWorlds) from three states: the state
-/// with the hidden vehicle, this state after removal of the vehicle, and the similar state. Each run takes place in a
-/// world with walls and in a world without walls. `batch` pairs run together. An interrupt ends the probe with the
-/// completed pairs. Throws UsageError if the number of scenes is not a multiple of the number of policies. Throws Error
-/// naming file and key for bad input.
+/// states of these worlds for egos, the vehicles to be taken over, that approach blind corners; see
+/// find_corner_states(). A state with a hidden vehicle is kept if that vehicle enters the junction within
+/// kTakeoverSteps and the ego sees no part of the vehicle. Renderer::visibility decides this, in the cameras of the
+/// first policy that reads images, or in the paper's cameras if no policy reads images. All states, with and without a
+/// hidden vehicle, are kept only if their scene lasts kTakeoverSteps more steps. Each pair of match_corners() is a
+/// state with a hidden vehicle and a similar state without one. Each policy then drives the ego for kTakeoverSteps
+/// (TakeoverWorlds) from three states: the state with the hidden vehicle, this state after removal of the vehicle, and
+/// the similar state. Each run takes place in a world with walls and in a world without walls. `batch` pairs run
+/// together. An interrupt ends the probe with the completed pairs. Throws UsageError if the number of scenes is not a
+/// multiple of the number of policies. Throws Error naming file and key for bad input.
 CornerResults probe_corner(const CornerOptions& options);
 /// Probes policies that are already open on one device, with their renderers and cameras. options.policies holds their
 /// names.

@@ -72,7 +72,8 @@ void set_speed_limits(Build* build);
 /// Builds the outline of the drivable surface.
 void build_road_edges(Build* build);
 
-/// Removes road edges where traffic leaves and enters a map without endless roads, and records missing links.
+/// Removes road edges where traffic leaves or enters the map, and records missing links. Call this only for maps
+/// without endless roads (has_endless_roads()).
 void open_road_ends(Build* build);
 
 /// build_markings() builds lane marks; build_objects() builds crosswalks, parking spaces and stop lines.

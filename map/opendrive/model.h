@@ -151,7 +151,7 @@ struct RoadLink {
   std::string id;
   ContactPoint contact = ContactPoint::start;
   bool has_contact = true;  // false: missing in the file and determined by repair_links()
-  SourceLocation where;     // also set for a link that was omitted
+  SourceLocation where;     // also set if repair_links() cleared the link
 };
 
 /// Direction of the traffic to which a signal applies: along s ("+"), against s ("-"), or either.

@@ -1,5 +1,5 @@
-// Operations on lane sections: splits and removes sections, and ends profiles. A lane that is continued from one
-// FileSection into the next is a single lane of the file.
+// Operations on lane sections: splits and removes sections, and ends profiles. After a split, a lane of the file has
+// one FileLane in each part; the later ones are marked is_continued.
 #pragma once
 
 #include <vector>

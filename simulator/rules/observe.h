@@ -72,7 +72,8 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
     const bool is_near = reach < kPartnerRange_m;
     int found = 0;
     for (int y = range.y0; y <= range.y1 && is_near; ++y) found += range.end(cells, y) - range.begin(cells, y);
-    // Usually at most half of the boxes in the cells are within reach, so fewer than 2 * kMaxPartners are too few.
+    // Usually at most half of the boxes in the cells are within reach. So the cells should contain at least 2 *
+    // kMaxPartners boxes.
     if (is_near && found < 2 * kMaxPartners) continue;
     Nearest nearest;
     if constexpr (ThreadGroup::kSize == 1) {
@@ -148,7 +149,7 @@ PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFram
   return count;
 }
 
-/// All pieces of one kind of a map, and the indices of those that may be visible from the agent's place.
+/// A map's pieces of one kind, and the indices of those that may be visible from the agent's place.
 struct PieceList {
   Span<const ObservedPiece> pieces;
   Span<const Vec2> middles;
@@ -294,7 +295,7 @@ PICTURA_HD inline void prefetch_list_near(const MapView& map, const NearPlace& p
   for (int line = 0; line < kLines; ++line) prefetch(items, line * kLineBytes);
 }
 
-/// Argument of observe_set() for a step. Its rows overwrite those of the previous step.
+/// Argument of observe_set() for a step. The destination contains the rows of the previous step.
 struct StepObservation {
   /// Returns the number of rows that may contain values other than zero. The count is clamped, because callers have
   /// access to the memory and may have changed it.

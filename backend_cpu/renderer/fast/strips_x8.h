@@ -11,7 +11,7 @@ namespace pictura {
 
 /// Eight strips on screen.
 struct StripsX8 {
-  unsigned visible = 0;   // lanes of strips that need no clipping, are large enough and are not occluded
+  unsigned visible = 0;   // bits of the SIMD lanes whose strips need no clipping, are large enough and are not occluded
   unsigned crossing = 0;  // lanes of strips that must be clipped first
   unsigned clockwise = 0;
   Vec2x8 corner[4];
