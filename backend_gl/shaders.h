@@ -27,7 +27,7 @@ void main() {
   vec3 p = gl_VertexID == 0 ? corner0 : gl_VertexID == 1 ? corner1 : gl_VertexID == 2 ? corner3 : corner2;
   vec2 at = projection.xy * p.xy + projection.zw * p.z;  // on screen, times depth
   // Points behind the near plane have no position on screen. Clipping replaces them by corners so far below the horizon
-  // that rounding these tilts the plane negligibly.
+  // that their rounding hardly tilts the plane.
   if (p.z >= near_m) {
     at = round(at / p.z * positions) / positions * p.z;
     p.xy = (at - projection.zw * p.z) / projection.xy;

@@ -1,4 +1,4 @@
-// Errors of images against the truth, the images of the ray caster in bench/truth/image_truth.h. They are measured for
+// Errors of images against the truth (the images of the ray caster in bench/truth/image_truth.h). They are measured for
 // the CPU renderer and for simpler methods. `pictura bench quality` and tests use this header; it is not installed.
 #pragma once
 

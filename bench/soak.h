@@ -49,8 +49,8 @@ struct SoakResult {
   int64_t first_faulty_scene = -1;
 };
 
-/// Function that makes the compared renderer, for scenes in host memory. It is called once per scene, and may write how
-/// the renderer was chosen to choice_out.
+/// Function that makes the compared renderer, for scenes in host memory. It is called once per scene, and may write to
+/// choice_out how the renderer was chosen.
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const RendererConfig&, std::string* choice_out)>;
 
 /// Compares scene by scene, and calls on_scene(result so far) after each scene. If a renderer cannot be made or drawing

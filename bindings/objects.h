@@ -1,4 +1,4 @@
-// C++ objects behind Python classes, for several files of the bindings: maps, geometries and scenes. Also the contents
+// C++ objects behind Python classes (maps, geometries and scenes), for several files of the bindings. Also the contents
 // of simulators, renderers and controllers, which the extension modules pass to each other.
 #pragma once
 

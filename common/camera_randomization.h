@@ -1,4 +1,4 @@
-// Randomization of a rig's cameras and of their images. Training with such deviations makes policies robust;
+// Randomization of a rig's cameras and of their images. Training with randomized cameras makes policies robust;
 // evaluations test policies at given deviations. common/raster/randomize_camera.h draws the random values.
 #pragma once
 

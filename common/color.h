@@ -52,7 +52,8 @@ PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
 }
 
 /// State of a traffic light. `unknown` means that a recording has no state for the light. Unknown lights, and all
-/// lights of a world without light states, are not drawn. Saved files contain these numbers, so they must not change.
+/// lights of a world without light states, are not drawn. Saved files contain the numbers of the states, which must not
+/// change.
 enum class LightState : uint8_t { off, red, yellow, green, unknown };
 constexpr int kNumLightStates = 5;
 

@@ -1,4 +1,4 @@
-// Functions that throw errors with a formatted message. Headers that only document an Error include error_types.h,
+// Functions that throw errors with a formatted message. Headers whose comments merely name Error include error_types.h,
 // which needs no fmt.
 #pragma once
 

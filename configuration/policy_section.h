@@ -15,8 +15,8 @@ constexpr int kMaxDecisionSteps = 1000;
 
 struct PolicySection {
   Modality modality = Modality::perspective;
-  // Only for the vector modality: also observes values that no camera could observe (the policy Vectorized of the
-  // paper).
+  // Only for the vector modality: also observes values that no camera could observe (the paper's policy named
+  // Vectorized).
   bool auxiliary = false;
   // Space to depth: each patch of patch_px x patch_px pixels becomes one pixel with the channels of all its pixels.
   int patch_px = 4;

@@ -68,8 +68,8 @@ struct TrainSection {
   Precision precision = Precision::bf16;
   bool reproducible = false;  // bitwise identical results in every run on a device, see policy/precision.h
   /// Storage of a rollout's images. kept: images stay in memory. redrawn: images are drawn again from the rollout's
-  /// scenes when they are read. auto: kept on the host, and kept on a device if they take at most two fifths of its
-  /// memory.
+  /// scenes when they are read. auto: redrawn if they would take more than two fifths of a CUDA device's memory, else
+  /// kept.
   std::string images = "auto";
   std::string graphs = "auto";                   // use of CUDA graphs for learning: auto or off
   HaltedSlots halted_slots = HaltedSlots::skip;  // draw is only for measurements; it draws every slot at every step

@@ -19,9 +19,9 @@ struct FilmOptions {
   int num_threads = 0;  // 0: all
 };
 
-/// Settings for a film's pictures from a policy's cameras. Each picture is as wide as the film's columns. The minimum
-/// width of lines is scaled with the image, so that a line covers equal shares of the picture and of the policy's
-/// image.
+/// Settings with which a film draws the images of a policy's cameras. Each picture is as wide as the film's columns.
+/// The minimum width of lines is scaled with the image, so that a line covers equal shares of the picture and of the
+/// policy's image.
 RendererConfig film_view(const RendererConfig& trained_view);
 
 /// Order of a rig's cameras in a film: cameras from left to right, then cameras that face backwards.

@@ -24,7 +24,7 @@ namespace pictura {
   X(int64_t, wall_contact)        /* counted neither in any_infraction nor in at_fault_infraction */               \
   X(int64_t, any_infraction)      /* a collision, off-road or a red light (paper, appendix, metric definitions) */ \
   X(int64_t, at_fault_infraction) /* a collision at fault, off-road or a red light */                              \
-  X(int64_t, active_at_end)       /* vehicles that did not halt before the last step, or before they left */       \
+  X(int64_t, active_at_end)       /* vehicles that did not halt */                                                 \
   X(int64_t, never_moved)         /* vehicles that stayed at rest (kRest_mps); 0 in files of earlier versions */   \
   X(int64_t, goals)                                                                                                \
   X(int64_t, waypoints)                                                                                            \

@@ -25,8 +25,8 @@ struct ScenePlan {
   std::vector<int32_t> takeover_steps;  // [tracks] episode step at which a driven track appears
 };
 
-/// Returns whether the scene has a road user to drive, before thinning and regardless of overlaps. If not, all vehicles
-/// are parked, or the scene has no vehicle.
+/// Returns whether the scene has a road user to drive, before thinning and regardless of overlaps. A scene has none,
+/// for instance, if all of its vehicles are parked.
 bool has_drivers(const CompiledMap& map, const SceneProtocol& protocol);
 
 /// Plans the roles of road users in a world of `map`, which must be compiled for episodes from protocol.start_step on.

@@ -47,7 +47,7 @@ int64_t map_file_bytes(const std::string& name);
 bool is_map_file(std::string_view name);
 
 /// Returns the folder of maps: $PICTURA_DATA if set, else $XDG_DATA_HOME/pictura/maps if XDG_DATA_HOME is set, else
-/// ~/.local/share/pictura/maps. Towns are searched there and in its subfolder `carla`.
+/// ~/.local/share/pictura/maps. Towns are searched for there and in the subfolder `carla`.
 std::string map_folder();
 
 /// Returns the names of the towns in the map folder, sorted.

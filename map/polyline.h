@@ -1,5 +1,5 @@
-// Conversion of curves to polylines, shared by all importers. The polylines have few points and pieces of bounded
-// length, and deviate from the curve by at most a tolerance.
+// Conversion of curves to polylines, shared by all importers. The polylines have few points, their pieces have bounded
+// length, and they deviate from the curve by at most a tolerance.
 #pragma once
 
 #include <algorithm>

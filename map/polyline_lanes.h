@@ -22,8 +22,8 @@ inline const LanePoint& end_of(const RoadMap& map, int32_t lane) {
   return points[points.size() - 1];
 }
 
-/// Appends a lane's points to the map, and sets the lane's range and length. There must be at least two points,
-/// relative to the map's origin, and none may equal the point before it. The heading at an inner point is midway
+/// Appends a lane's points to the map, and sets the lane's range and length. The points are relative to the map's
+/// origin. There must be at least two, and none may equal the point before it. The heading at an inner point is midway
 /// between the directions of the chords before and after it.
 void append_lane_points(const std::vector<CurvePoint>& points, RoadMap* map, Lane* lane_out);
 

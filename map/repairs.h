@@ -10,7 +10,8 @@
 
 namespace pictura {
 
-/// Kinds of repairs, in the order of the tables in docs/reference/opendrive.md and docs/reference/lanelet2.md.
+/// Kinds of repairs, in the order of the tables in docs/reference/opendrive_conformance.md and
+/// docs/reference/lanelet2.md.
 enum class RepairKind : uint8_t {
   record_order,
   record_beyond_end,
@@ -85,7 +86,8 @@ enum class RepairKind : uint8_t {
   empty_rule,
 };
 
-/// First kind that only Lanelet2 files have. The table of docs/reference/opendrive.md lists the kinds before it.
+/// First kind that only Lanelet2 files have. The table of docs/reference/opendrive_conformance.md lists the kinds
+/// before it.
 inline constexpr RepairKind kFirstLanelet2Repair = RepairKind::repeated_element;
 
 /// Returns the fault that a kind repairs, such as "records out of order".

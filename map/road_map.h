@@ -44,7 +44,7 @@ struct IndexRange {
   int32_t size() const { return end - begin; }
 };
 
-/// A sample of a lane's centre line, in the direction of travel, at most kMaxPiece_m from the next sample.
+/// A sample of a lane's centre line. Samples follow each other in the direction of travel, at most kMaxPiece_m apart.
 struct LanePoint {
   Vec3 position_m;
   float heading_rad = 0;

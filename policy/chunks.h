@@ -13,7 +13,7 @@ namespace pictura {
 constexpr int64_t kChunkGranule = 256;
 
 /// Sizes of the chunks of a batch: equal parts of at most `max_size` rows. With `are_full`, every chunk has `max_size`
-/// rows; results that depend on the chunk size then do not depend on the batch size.
+/// rows, so that results do not depend on the batch size.
 struct ChunkSizes {
   int64_t max_size = 1;
   bool are_full = false;
@@ -28,7 +28,7 @@ inline int64_t chunk_size(int64_t count, const ChunkSizes& sizes, bool on_device
   return std::min(max_size, (equal + granule - 1) / granule * granule);
 }
 
-/// Elements [begin, begin + count) of a batch. `rows` are their row numbers, i64 [chunk size], followed by padding.
+/// Elements [begin, begin + count) of a batch. `rows`, i64 [chunk size], are their row numbers followed by padding.
 /// Padding repeats the batch's first element; its results must be discarded.
 struct Chunk {
   at::Tensor rows;

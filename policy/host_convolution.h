@@ -26,8 +26,8 @@ struct ConvolutionSize {
 /// Convolution of blocks of images. The bits of its results do not depend on the vector width.
 class DirectConvolution {
  public:
-  /// Whether compute() supports this number of output channels; whether compute_image_gradient() supports this number
-  /// of input channels.
+  /// Whether this number of channels is possible: supports() for outputs of compute(), supports_gradient() for images
+  /// of compute_image_gradient().
   static bool supports(int64_t outputs) { return outputs == 8 || outputs == 16 || outputs == 32; }
   static bool supports_gradient(int64_t channels) { return channels % 8 == 0; }
 

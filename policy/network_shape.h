@@ -1,4 +1,4 @@
-// Sizes that both the policy's layers and the estimate of their memory use.
+// Sizes used by the policy's layers and by the estimate of their memory.
 #pragma once
 
 #include <string_view>

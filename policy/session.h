@@ -19,8 +19,8 @@ struct Config;
 struct SessionParts;
 
 /// Returns the training configuration with the changes of the options. Device settings of the training configuration
-/// are replaced by those of the options, because they depend on the machine. The renderer may be any that draws the
-/// same images.
+/// are replaced by those of the options, because they depend on the machine. Unless the options name a renderer, cpu
+/// and cuda become auto, because all three draw the same images.
 Config with_session_options(const Config& trained, const SessionOptions& options);
 
 /// Observations of a batch of agents. All arrays are in the memory of the session's device.
@@ -81,8 +81,8 @@ class PolicySession {
   /// Device of the network. Simulators, renderers and all arrays passed to the session use its memory.
   Device device() const;
 
-  /// Renderer configuration of the policy's images: cameras and randomization as the options specify; line floor
-  /// (minimum width of drawn lines), palette and samples as in training.
+  /// Renderer configuration of the policy's images: cameras, randomization and samples as the options specify; line
+  /// floor (minimum width of drawn lines) and palette as in training.
   RendererConfig renderer_config() const;
   /// Creates a renderer of the policy's images that draws in the memory of device(). The caller must upload the maps.
   /// Returns null if the policy reads no images. Throws Error if the renderer cannot run on this machine.

@@ -1,6 +1,6 @@
 // Lossless compression of a replay's images. Most pixels equal the pixel to their left, above them, or in the previous
-// image. Most other pixels have one of a few hues at some brightness. An adaptive arithmetic coder encodes the case of
-// each pixel; docs/reference/replay.md defines the format. Each group of frames can be decoded separately.
+// image. Most other pixels have one of a few hues at some brightness. An adaptive arithmetic coder encodes which case
+// applies to each pixel; docs/reference/replay.md defines the format. Each group of frames can be decoded separately.
 #pragma once
 
 #include <cstdint>

@@ -36,8 +36,8 @@ class LiveWorld final : public StepObserver {
   int64_t step() const { return step_; }
 
  private:
-  /// Discards all frames of the recording except the newest. `num_episodes` is the number of recorded episodes before
-  /// that frame was recorded.
+  /// Discards all frames of the recording except the newest. `num_episodes` is the number of episodes in the recording
+  /// before that frame was added.
   void keep_newest(size_t num_episodes);
 
   Recorder recorder_;

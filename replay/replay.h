@@ -18,7 +18,7 @@
 
 namespace pictura {
 
-/// Maximum number of values in all tracks of a replay: for example, 120 agents for 24,000 steps, which take 256 MB.
+/// Maximum number of values in all tracks of a replay: enough for 120 agents and 24,000 steps, in 256 MB.
 constexpr int64_t kMaxReplayNumbers = int64_t{1} << 26;
 
 /// Version of the file format. Readers accept no other version.
@@ -182,10 +182,10 @@ struct ReplayImages {
 struct ReplayOrigin {
   std::string command, commit, version;
   std::string map, map_hash;
-  // File coordinates of the map's (0, 0, 0); zero in replay files of earlier versions.
+  // File coordinates of the map's (0, 0, 0); zero in replay files that lack them.
   std::array<double, 3> map_origin_m{};
   std::string policy, policy_hash;
-  std::string light_cycles;  // from light_cycles_text(); empty in files of earlier versions
+  std::string light_cycles;  // from light_cycles_text(); empty in files that lack them
   uint64_t seed = 0;
   uint32_t global_world = 0;
   float dt_s = 0.1f;

@@ -95,9 +95,9 @@ constexpr int kNumWaypoints = 3;
   X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                          \
   X(episode_return, float, 1, 0, "sum of rewards in this episode")
 
-// Fields of lives. A life lasts from an agent's start or entry until it leaves the map. On maps with roads that end,
-// several lives follow each other in a slot. On other maps these fields keep their initial values, and saved states and
-// hashes omit them.
+// Fields of lives. A life lasts from an agent's start or entry until the agent leaves the map or halts, or the episode
+// ends. On maps with roads that end, several lives follow each other in a slot. On other maps these fields keep their
+// initial values, and saved states and hashes omit them.
 #define PICTURA_LIFE_FIELDS(X)                                                \
   X(life, int32_t, 1, 0, "number of earlier lives in this episode")           \
   X(life_step, int32_t, 1, 0, "step of this episode at which the life began") \

@@ -32,8 +32,9 @@ std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenar
 std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<const int32_t> driven,
                                                Span<const int32_t> replayed, int num_agents);
 
-/// Adapts a configuration to a scene. Sets the recording's time step, dynamics multipliers of 1, and episodes that
-/// always last from start_step to the end of the recording. Removes walls, and all parked cars except replayed tracks.
+/// Adapts a configuration to a scene. The result has the recording's time step (at most kMaxStep_s), dynamics
+/// multipliers of 1, and episodes that always last from start_step to the end of the recording. Removes walls, and all
+/// parked cars except replayed tracks.
 SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step = 0, SimulatorConfig config = {});
 
 /// Returns a world on a scene's map with one agent for each track. `index` is the index of the map among a simulator's

@@ -1,5 +1,5 @@
-// Rules of the simulation that have several variants; a configuration chooses one. Code on the host and on GPUs reads
-// them.
+// Rules of the simulation with several variants, of which a configuration chooses one. Code on the host and on GPUs
+// reads them.
 #pragma once
 
 #include "pictura/common/portable/hd.h"

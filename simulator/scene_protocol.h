@@ -53,7 +53,7 @@ struct SceneProtocol {
 /// Returns the protocols: womd (the paper's), gpudrive, pufferdrive2, pufferdrive3, waymax and simagents.
 const std::vector<SceneProtocol>& scene_protocols();
 std::vector<std::string> scene_protocol_names();
-/// Returns the protocol of this name. Throws UsageError, which lists the names, for another name.
+/// Returns the protocol of this name. Throws UsageError, which lists the names, for an unknown name.
 SceneProtocol scene_protocol(const std::string& name);
 
 /// Setting of a protocol that set_scene_rule() can change.
@@ -63,13 +63,14 @@ struct SceneRule {
   const char* what;
 };
 std::vector<SceneRule> scene_rules();
-/// Sets a rule from "name=value". Throws UsageError, which lists the valid names or values, for another name or value.
+/// Sets a rule from "name=value". Throws UsageError, which lists the valid names or values, for an invalid name or
+/// value.
 void set_scene_rule(const std::string& assignment, SceneProtocol* protocol_inout);
 /// Returns names and values of all rules.
 std::vector<std::pair<std::string, std::string>> rules_of(const SceneProtocol& protocol);
 
 /// Throws UsageError, which names the setting, if a setting is invalid. Examples are steps below 1, a density outside
-/// (0, 1], and an id or unknown word in `control`.
+/// (0, 1], and a track id or an unknown word in `control`.
 void check(const SceneProtocol& protocol);
 
 /// Row of the paper's table on the Waymo Open Motion Dataset (zero-shot self-play, 44,073 scenes of the validation

@@ -106,7 +106,7 @@ struct SimulatorCapacity {
     return worlds >= other.worlds && slots >= other.slots && lights >= other.lights && maps >= other.maps &&
            map_bytes >= other.map_bytes;
   }
-  /// Returns the maximum of both capacities in every member.
+  /// Returns, for every member, the maximum of both capacities.
   SimulatorCapacity joined(const SimulatorCapacity& other) const;
 };
 
@@ -133,7 +133,7 @@ class StateSnapshot {
 /// Numbers of requested and placed agents in the current episodes of all worlds.
 struct SpawnReport {
   int64_t asked = 0, spawned = 0, refused = 0;      // asked == spawned + refused
-  int64_t refused_no_place = 0, refused_taken = 0;  // `refused` by SpawnFailure
+  int64_t refused_no_place = 0, refused_taken = 0;  // `refused`, split by SpawnFailure
   int64_t entered = 0, left = 0;                    // on roads that end: numbers of later entries, and of departures
   int64_t parked_asked = 0, parked_placed = 0;
 };
@@ -170,8 +170,8 @@ class Simulator {
   const SlotTable& slots() const { return arrays_.slots; }
   const ObservationView& observations() const { return arrays_.observations; }
   const SceneBatch& scene() const { return arrays_.scene; }
-  /// One view per slot. The view of an absent agent is at the map's origin and has no ego, so it excludes no agent. It
-  /// can be drawn like any other view, but its images have no meaning, and its slot is never valid.
+  /// One view per slot. The view of an absent agent is at the map's origin and has no ego, so no box is omitted. It can
+  /// be drawn like any other view, but its images have no meaning, and its slot is never valid.
   Span<const View> views() const { return arrays_.views; }
   const AgentStateView& state() const { return arrays_.state; }
   Span<const int32_t> episode_step() const { return arrays_.episode_step; }

@@ -56,8 +56,8 @@ inline WorldsToken new_worlds_token() { return std::make_shared<const char>(); }
 
 /// Side of the square cells into which a world's boxes are sorted; see HostWorlds.
 constexpr float kBoxCell_m = 25.0f;
-/// Numbers of cells that cover a map. They have 64 bits, because the cells of maps too large to be simulated are
-/// counted too.
+/// Numbers of cells that cover a map. They have 64 bits, because cells are also counted for maps that are too large to
+/// be simulated.
 struct BoxCellCounts {
   int64_t num_x, num_y;
 };

@@ -88,11 +88,11 @@ class OutOfMemory : public Error {
 /// - progress.csv, evaluation.csv if train.evaluate_every is set, and TensorBoard events
 ///
 /// After an interrupt (common/support/interrupt.h) the function saves and returns with `interrupted`. It returns with
-/// `out_of_time` if another update would not end within `minutes`. The expected duration is that of the longest update
-/// of this process. Before the first update it comes from an earlier process with the same number of agents and a
-/// device of the same product, if there was one. Throws Error naming file and key for bad input. Throws Error naming
-/// the folder if another run is active in it, or if it holds a run and old_run is `refuse`. Throws OutOfMemory if the
-/// device's memory is too small.
+/// `out_of_time` if another update would not end within `minutes`. The expected duration is 1.2 times that of the
+/// longest update of this process. Before the first update, the longest update of an earlier process counts instead if
+/// that process had equally many agents and a device of the same product. Throws Error naming file and key for bad
+/// input. Throws Error naming the folder if another run is active in it, or if it holds a run and old_run is `refuse`.
+/// Throws OutOfMemory if the device's memory is too small.
 ///
 /// Several processes train one policy if each calls this function with its `launch` and equal settings. Rank 0 alone
 /// reads and writes files. An interrupt of one process ends all processes after the same update. If a rank fails, ends

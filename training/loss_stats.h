@@ -48,7 +48,8 @@ inline at::Tensor stacked(const LossTensors& stats) {
   return at::stack(values).detach().to(at::kDouble);
 }
 
-/// Returns the elements of a row of all statistics as views. The row is [kNumLossStats], in the order of visit().
+/// Returns views of the elements of a row that holds all statistics. The row is [kNumLossStats], in the order of
+/// visit().
 inline LossTensors elements_of(const at::Tensor& row) {
   LossTensors elements;
   int64_t i = 0;

@@ -30,9 +30,10 @@ struct NetworkSize {
 };
 NetworkSize network_size(const Config& config, Device device);
 
-/// Throws Error if an estimate exceeds `memory_bytes` of the device. One estimate is for the network with a chunk of
-/// train.forward_chunk, another for the network and the agents. The error names the responsible settings, and the
-/// number of transitions or agents that would fit. With several ranks, both estimates are for one rank.
+/// Throws Error if an estimate exceeds `memory_bytes` of the device. One estimate is for the network with
+/// train.forward_chunk transitions at once, another for the network and the agents. The error names the responsible
+/// settings, and the number of transitions or agents that would fit. With several ranks, both estimates are for one
+/// rank.
 void check_memory(const Config& config, Device device, int64_t memory_bytes, int num_ranks = 1);
 
 /// Estimated bytes of maps.

@@ -25,7 +25,7 @@ class RunKeeper {
 
   /// Starts the run as the options specify: from its last checkpoint, from the weights of another run, or from new
   /// weights. In the last case it also saves the untrained policy. A run that is overwritten stays until the first
-  /// save(). Returns the recent updates for the mean return.
+  /// save(). Returns the recent updates, over which the log averages returns.
   std::vector<RecentUpdate> begin(Run* run);
 
   /// Whether the configuration asks for a checkpoint after the run's latest update.

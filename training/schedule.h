@@ -16,7 +16,7 @@ bool schedule_has_ended(const TrainSection& config, int64_t agent_steps);
 
 /// Returns the factor by which logits are multiplied after an update of this number of agent-steps. Logits double every
 /// sharpen_agent_steps, as if the softmax's temperature halved. Agents that start moving only by chance then wait even
-/// longer, so the policy learns to start.
+/// longer, so the policy must learn to start.
 double logit_growth(const TrainSection& config, int64_t agent_steps);
 
 /// Returns the weight of the KL divergence from the teacher's actions in an update that starts after `agent_steps`. The

@@ -1,6 +1,7 @@
 // Drawing of one image. It sets up the faces of all primitives that may be visible, rasterizes the faces into fragments
-// (the part of a pixel that one face covers), and composites each pixel. The rules of drawing are in common/raster,
-// which CUDA kernels share. ImageDrawer adds only the memory, which all images reuse, and the order of the work.
+// (each is the part of a pixel that one face covers), and composites each pixel. The rules of drawing are in
+// common/raster, which CUDA kernels share. ImageDrawer adds only the memory, which all images reuse, and the order of
+// the work.
 #pragma once
 
 #include <functional>

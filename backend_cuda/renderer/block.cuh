@@ -56,7 +56,7 @@ struct BlockState {
   PreparedImage upcoming;  // next image
   Scratch scratch;         // scratch memory of this block
   ScreenFace* faces;       // faces of the current image
-  PolygonEdge* edges;      // edges of all images in the pool
+  PolygonEdge* edges;      // pool of the edges of all images
   // Used during culling and face set-up:
   ViewState view;
   FaceSetupContext context;
@@ -132,7 +132,7 @@ __device__ inline int warp_inclusive_sum(int value) {
   return value;
 }
 
-// Allocates indices for a whole warp from a counter, with one atomic addition, and returns the first in all lanes.
+// Allocates a whole warp's indices from a counter, with one atomic addition, and returns the first index to all lanes.
 // end: inclusive prefix sum of the lanes' counts.
 __device__ inline int32_t warp_allocate(int32_t* counter, int end) {
   int32_t first = 0;

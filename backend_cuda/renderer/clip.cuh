@@ -143,9 +143,9 @@ __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t i
           light_ref(index)};
 }
 
-// Clips a lane's face of `count` corners in place, as clip_face does. This is possible because the function writes at
-// most one corner beyond those that it has read. Returns the number of corners, or kTooManyCorners if they do not fit
-// or the face is not exactly convex.
+// Clips a lane's face of `count` corners as clip_face does, but in place. This is possible because it reads one corner
+// ahead, and writes at most one corner more than it has clipped. Returns the number of corners, or kTooManyCorners if
+// they do not fit or the face is not exactly convex.
 constexpr int kTooManyCorners = -1;
 __device__ inline int clip(const Frustum& f, unsigned crossed, int count, LaneCorners corners) {
   if (crossed == kOutside) return 0;
@@ -175,7 +175,7 @@ __device__ inline int clip(const Frustum& f, unsigned crossed, int count, LaneCo
   return count;
 }
 
-// Projects a lane's clipped face in place, as make_screen_face does. Sets its bounds and winding, and returns a bit
+// Projects a lane's clipped face as make_screen_face does, but in place. Sets its bounds and winding, and returns a bit
 // mask of the corners at which an edge begins; 0 if the face covers nothing.
 __device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCorners corners, int count,
                                             ScreenBounds* bounds, bool* is_clockwise) {

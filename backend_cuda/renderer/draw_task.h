@@ -31,8 +31,8 @@ class SortedPieces {
 DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeCamera>& cameras,
                         const SceneBatch& scene, const ViewBatch& views, const ImageBatch* images);
 
-/// Returns the sizes of a block's scratch memory in the last launch. They suffice for all primitives of a world with
-/// `agents` agents on a map with `pieces` pieces, of which `heads` are light heads.
+/// Returns the sizes of a block's scratch memory in the overflow launch (the last one). They suffice for all primitives
+/// of a world with `agents` agents on a map with `pieces` pieces, of which `heads` are light heads.
 Scratch overflow_sizes(int pieces, int heads, std::size_t agents);
 
 /// Returns the text of a fault, which must not be `none`.

@@ -320,7 +320,7 @@ class BestOccluders {
  public:
   __device__ explicit BestOccluders(FaceSetupContext* context) : context_(context) {}
 
-  /// Adds the faces of the entries of lanes with is_active to the selection. Collective over all lanes of the warp.
+  /// Offers the face of each active lane's entry for selection. Collective over all lanes of the warp.
   __device__ void add(bool is_active, uint32_t entry) {
     const ImageSetting& setting = context_->setting;
     const FaceSetupContext* context = context_;

@@ -16,9 +16,9 @@ __device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px
 }
 
 /// Word of a pixel. While fully covering faces are sought, the upper bits hold the largest occluder bound, as bits that
-/// sort like the bound. The lower bits hold the index of the bound's face plus 1. From the pixel's first fragment on,
-/// the upper bits hold the first fragment of its list, and the sign bit is set. The word is 0 if the pixel has neither
-/// a face nor a fragment.
+/// sort like the bound. The lower bits hold the index of the bound's face plus 1. Once the pixel has a fragment, the
+/// upper bits hold the first fragment of its list, and the sign bit is set. The word is 0 if the pixel has neither a
+/// face nor a fragment.
 template <typename Word>
 struct PixelWord {
   static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
@@ -267,7 +267,7 @@ __device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wan
 // Makes all effective samples of a fragment visible initially. A fragment that covers its pixel fully may intersect the
 // pixel's full face, which then becomes a fragment too. Lists the pixels to be composited: those with fragments that
 // are not alone (is_alone()). Records whether any pixel's remainder may have to be divided: whether several fragments
-// cover the pixel fully, and one that is no sliver covers it partly. Hardly any pixel has such fragments.
+// cover the pixel fully, and another, which is no sliver, covers it partly. Hardly any pixel has such fragments.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;
@@ -280,7 +280,7 @@ __device__ void finish_fragments(const Memory& memory, int count) {
   PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize; first < count; first += Memory::kThreads) {
     const int i = first + lane_index();
-    // The last fragment of a pixel's list adds the pixel.
+    // The thread of the last fragment of a pixel's list adds the pixel to the composited pixels.
     const bool is_listed =
         i < count && memory.next[i] == static_cast<Index>(Memory::kNone) && !is_alone(memory, i, memory.pixel[i]);
     const int32_t index = warp_allocate_one(&memory.state->num_composited, is_listed);

@@ -27,7 +27,7 @@ __device__ inline void mark_overflowed(const DrawTask& task, int32_t image) {
   task.overflow_images[atomicAdd(&task.counters->overflow, 1)] = image;
 }
 
-// Defers an image that does not fit into the pool until the pool is free again.
+// Defers, until the pool is free again, an image that does not fit into it.
 __device__ inline void defer(const DrawTask& task, int32_t image) {
   task.deferred_images[atomicAdd(&task.counters->deferred, 1)] = image;
 }

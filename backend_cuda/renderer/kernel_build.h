@@ -28,7 +28,8 @@ struct KernelCode {
 std::string nvrtc_unavailable();
 
 /// Compiles a program. If an earlier call had the same sources, target and version of NVRTC, reads its cached code
-/// instead, unless the cached file is damaged. Throws Error with the compiler's messages, or if NVRTC cannot be opened.
+/// instead, unless the cached file is damaged. Throws Error if NVRTC cannot be opened, or, with the compiler's
+/// messages, if compilation fails.
 KernelCode build_kernels(const KernelProgram& program, const KernelTarget& target);
 
 /// Returns the file in which build_kernels() caches the code. Empty if caching is off.

@@ -50,7 +50,7 @@ class ObservationWriter {
     group.sync();
   }
 
-  /// Version of observe_pieces() with several pieces per thread at a time, whose loads overlap.
+  /// Version of observe_pieces() in which each thread loads several pieces at a time, so that the loads overlap.
   template <typename ThreadGroup>
   PICTURA_HD static int collect_pieces(const ThreadGroup& group, const PieceList& near, const EgoFrame& frame,
                                        int capacity, float* rows) {

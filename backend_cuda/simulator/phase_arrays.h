@@ -22,7 +22,7 @@ struct WorldScratch {
   int32_t *cell_begin = nullptr, *cell_items = nullptr;
 };
 
-/// Value that marks "no slot with an action out of range". All its bytes are equal, so that memset can write it.
+/// Value that marks that there is no such slot or element. All its bytes are equal, so that memset can write it.
 constexpr int32_t kNoSlot = 0x7F7F7F7F;
 
 /// Addresses of all memory that the phases read and write, in one memory space.
@@ -53,8 +53,9 @@ struct PhaseArrays {
   int32_t parked_per_world = 0;     // number of boxes of a world that belong to no agent
   uint8_t has_crowds = 0;           // whether some world is a crowd
   // Values that phases and steps pass to later ones:
-  uint8_t* began = nullptr;     // [num_worlds] whether an episode began in the last step, so the next must be prepared
-  uint8_t* prepares = nullptr;  // [num_worlds] whether the next episode is prepared in the current step
+  uint8_t* began =
+      nullptr;  // [num_worlds] whether an episode began in the last step, so the next episode must be prepared
+  uint8_t* prepares = nullptr;          // [num_worlds] whether the next episode is prepared in the current step
   int32_t* next_spawned = nullptr;      // [num_worlds] number of agents in the next episode
   int32_t* rejected_slot = nullptr;     // lowest slot with a command out of range, or kNoSlot
   int64_t* rejected_command = nullptr;  // first rejected command since the host checked, or kNoRejection

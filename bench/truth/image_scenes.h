@@ -28,7 +28,7 @@ Snapshot make_crowd();
 
 /// Four worlds on two towns: the second town, the first town without agents, the first town, and the second town
 /// without lights. The world without agents has one view. Each other world has three views, each of which hides a
-/// different third of the town's egos.
+/// different third of the town's vehicles.
 struct SyntheticWorlds {
   std::vector<StaticGeometry> maps;
   SceneOwner scene;

@@ -32,8 +32,8 @@ constexpr double kMovedSceneError = 8.0 / 255;
 /// Maximum share of a moved scene's values that change by more than rounding.
 constexpr double kMovedSceneShare = 1e-3;
 /// Maximum relative difference between the summed coverage of a box's faces and the coverage of the box's silhouette.
-/// They are equal except for rounding, and except for up to 1e-3 of a border pixel, which may count as empty or full
-/// (kFullCoverage).
+/// They are equal except for rounding, and for border pixels that count as full although up to 1e-3 of them is
+/// uncovered (kFullCoverage).
 constexpr double kSilhouetteError = 3e-4;
 /// Maximum channel difference between a line of two pieces and the same line of one piece. The common edge of the
 /// pieces splits pixels exactly, and the ends of the pieces are rounded to 1e-5 px.

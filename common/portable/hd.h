@@ -15,7 +15,7 @@
 #else
 #define PICTURA_NO_UNROLL
 #endif
-// Unrolls by four a loop over the corners of a face: nearly all faces have four corners, which then stay in registers.
+// Unrolls a loop over a face's corners by four: nearly all faces have four corners, which then stay in registers.
 #if defined(__CUDA_ARCH__)
 #define PICTURA_UNROLL_FOUR _Pragma("unroll 4")
 #else

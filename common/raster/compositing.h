@@ -137,8 +137,8 @@ PICTURA_HD inline Rgb rgb_of_bytes(uint32_t bytes) {
   return rgb8(byte(0), byte(1), byte(2));
 }
 
-/// Visible weight of an agent in an image, summed over the agent's fragments. The sums are integers, so that they do
-/// not depend on the order of the fragments.
+/// Visible weights of an agent, among all faces and alone, summed over its fragments in a view's images. The sums are
+/// integers, so that they do not depend on the order of the fragments.
 struct VisibilitySum {
   int64_t among_all = 0, alone = 0;
 
@@ -147,7 +147,7 @@ struct VisibilitySum {
     constexpr float kUnits = 1 << 30;
     return static_cast<int64_t>(weight * kUnits);
   }
-  /// Visible weight among all agents divided by the weight of the agent alone; NaN if the agent alone has weight 0.
+  /// Visible weight among all faces divided by the weight of the agent alone; NaN if the agent alone has weight 0.
   PICTURA_HD float share() const {
     if (alone <= 0) return float_from_bits(0x7FC00000u);
     const double share = static_cast<double>(among_all) / static_cast<double>(alone);

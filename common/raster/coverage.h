@@ -112,8 +112,8 @@ PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px
   return samples_within(range);
 }
 
-/// Contribution of an edge to a polygon's area in a pixel. An edge on the polygon's right adds the area to the edge's
-/// left, within the rows that the edge spans. An edge on the polygon's left subtracts that area. Both omit a term that
+/// Contribution of an edge to a polygon's area in a pixel. An edge on the polygon's right adds the area left of the
+/// edge, within the rows that the edge spans. An edge on the polygon's left subtracts that area. Both omit a term that
 /// cancels in the sum over a closed polygon.
 PICTURA_HD inline float area_of(const PolygonEdge& edge, const EdgeCrossing& crossing, float y_px) {
   const float from = saturate(edge.y0 - y_px), to = saturate(edge.y1 - y_px);

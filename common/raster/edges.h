@@ -7,8 +7,8 @@
 
 namespace pictura {
 
-/// An edge of a polygon on screen. Apart from two signs, its members do not depend on the edge's direction. So two
-/// faces that share an edge split areas and samples exactly.
+/// An edge of a polygon on screen. Apart from the sign of rows_scale, its members do not depend on the edge's
+/// direction. So two faces that share an edge split areas and samples exactly.
 struct alignas(16) PolygonEdge {
   float x0 = 0, y0 = 0;  // the upper end
   float half_dx_dy = 0;  // half of dx/dy of the line; 0 for level edges
@@ -66,9 +66,9 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   // crosses the height of the centre at the same x.
   const float shrink = is_level ? 1.0f : min_of(kSteepest * fabsf(dx_dy), 1.0f);
   const float scale = shrink * (0.5f * kSampleRows / kLines_rows), step_rows = shrink * edge.dy_dx;
-  // rows_scale and rows_offset map the sum of the line's heights at the pixel's left and right sides to its height in
-  // the first column right of the centre, as a fraction of kLines_rows; 0.5 is the pixel's centre. The heights at the
-  // sides are in pixels from the pixel's top.
+  // From the sum of the line's heights at the pixel's left and right sides, rows_scale and rows_offset give the line's
+  // height in the first column right of the centre, as a fraction of kLines_rows; 0.5 is the pixel's centre. The
+  // heights at the sides are in pixels from the pixel's top.
   edge.rows_scale = (dx > 0.0f) == downward ? scale : -scale;
   edge.rows_offset = 0.5f - scale + step_rows * (0.5f / kLines_rows);
   edge.rows_step = static_cast<int32_t>(floorf(step_rows * kRowUnits + 0.5f));

@@ -69,8 +69,8 @@ PICTURA_HD inline Extent extent_of(uint32_t object_id, const StaticGeometryView&
   }
 }
 
-/// Corners on the ground plane. turn() rotates the corners, so that code visits all sides without an index. An index
-/// would force the corners into a CUDA thread's local memory.
+/// Corners on the ground plane. turn() shifts the corners cyclically, so that code visits all sides without an index.
+/// An index would force the corners into a CUDA thread's local memory.
 struct GroundQuad {
   Vec2 corner[4];
   PICTURA_HD void turn() {
@@ -177,8 +177,8 @@ PICTURA_HD inline bool are_equal_depths(float inverse_depth_a, float inverse_dep
   return fabsf(inverse_depth_a - inverse_depth_b) < kEqualDepth * max_of(inverse_depth_a, inverse_depth_b);
 }
 
-/// Whether face a is in front of face b at a screen point that both cover: the nearer face, or at equal depths the
-/// lower object id. `stands(solid, strip)` evaluates stands_on() for their object ids.
+/// Whether face a is in front of face b at a screen point that both cover: the nearer face is in front, or at equal
+/// depths the face with the lower object id. `stands(solid, strip)` evaluates stands_on() for their object ids.
 template <typename Stands>
 PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at_px, Stands&& stands) {
   const bool strip_a = is_strip(a), strip_b = is_strip(b);
@@ -262,8 +262,8 @@ PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
 
 /// Whether any part of the face may be in front of the largest occluder bound of pixel (x, y). For a strip seen from
 /// below, the test includes all solids that may stand on the strip. If the result is false, the face gets no fragment,
-/// because the face with that bound hides it. CUDA code may first test against bounds of other faces, in any order,
-/// because the largest bound rejects every face that a smaller bound rejects.
+/// because another face, that of the largest bound, hides it. CUDA code may first test against bounds of other faces,
+/// in any order, because the largest bound rejects every face that a smaller bound rejects.
 PICTURA_HD inline bool passes_occluder_bound(const ScreenFace& face, float bound, int x, int y) {
   const float nearest = center_inverse_depth(face, x, y) + inverse_depth_half_range(face);
   return !(nearest * face.nearest_standing < bound);

@@ -10,7 +10,8 @@
 namespace pictura {
 
 /// A folder that a command refills. Files that an earlier call of the same kind wrote are removed, unless this call
-/// writes them again. The hidden file .pictura-KIND in the folder lists the written files; all other files stay.
+/// writes them again. The hidden file .pictura-KIND in the folder lists the written files; files that it does not list
+/// stay.
 class FilledFolder {
  public:
   /// Creates the folder. Throws Error as make_output_folder() does, or if the list is a symbolic link.

@@ -1,5 +1,5 @@
-// Descriptions of options. Each struct of options has one list of them: visit_options(options, visitor) calls the
-// visitor with each option's description and value. Keyword arguments in Python, flags of commands and keys of
+// Descriptions of options. Each struct of options has one list of descriptions: visit_options(options, visitor) calls
+// the visitor with each option's description and value. Keyword arguments in Python, flags of commands and keys of
 // configuration files come from these lists.
 #pragma once
 

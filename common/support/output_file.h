@@ -1,5 +1,6 @@
 // Writer of all output files. Bytes go into a file without a name, and only a complete file gets a name. So a reader
-// never sees half a file, a full disk leaves the old file unchanged, and a killed process leaves no file behind.
+// never sees half a file, a full disk leaves the old file unchanged, and a killed process leaves at most a hidden file
+// behind.
 #pragma once
 
 #include <optional>

@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// Throws Error naming the path if it is a FIFO, a socket or a device. Accepts missing files and folders, because
+/// Throws Error naming the path if it is a FIFO, a socket or a device. Accepts folders and missing files, because
 /// reading them reports an error.
 inline void require_regular_file(const std::string& path) {
   std::error_code ignored;

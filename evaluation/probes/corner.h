@@ -46,7 +46,7 @@ void visit_options(CornerOptions& options, Visitor&& v) {
 }
 
 /// Drives evaluation worlds as probe_removal() does, or with options.worlds.controller in all worlds. Searches the
-/// states of these worlds for egos, the vehicles to be taken over, that approach blind corners; see
+/// states of these worlds for egos (the vehicles to be taken over) that approach blind corners; see
 /// find_corner_states(). A state with a hidden vehicle is kept if that vehicle enters the junction within
 /// kTakeoverSteps and the ego sees no part of the vehicle. Renderer::visibility decides this, in the cameras of the
 /// first policy that reads images, or in the paper's cameras if no policy reads images. All states, with and without a

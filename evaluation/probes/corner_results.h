@@ -18,7 +18,7 @@ namespace pictura {
 enum class CornerCase : uint8_t {
   hidden,   // a hidden vehicle comes
   removed,  // the control: the same state after removal of the hidden vehicle
-  empty,    // a similar state at another corner from which no vehicle comes
+  empty,    // a similar state at a corner from which no vehicle comes
 };
 constexpr std::array<const char*, 3> kCornerCaseNames{"hidden", "removed", "empty"};
 constexpr size_t kCornerCases = kCornerCaseNames.size();
@@ -28,7 +28,7 @@ constexpr std::array<const char*, 2> kWallNames{"on", "off"};  // with walls, wi
 enum class CornerControl : uint8_t {
   none,      // the hidden vehicle
   permuted,  // a control: another vehicle near the ego, drawn at random for each pair; none if no other vehicle is near
-  untrained,  // a control: the hidden vehicle, for policies with fresh weights in the same states
+  untrained,  // a control: the hidden vehicle; policies with fresh weights drive in the same states
 };
 constexpr std::array<const char*, 3> kCornerControlNames{"none", "permuted", "untrained"};
 

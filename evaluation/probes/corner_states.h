@@ -48,7 +48,8 @@ struct CornerState {
 
 /// Finds the states in one world of a frame, with or without a hidden vehicle. A hidden vehicle drives in range on a
 /// lane of the corner's hidden traffic, and walls hide it from the ego's front camera `front`. If there are several,
-/// the nearest is used. A state is empty if no vehicle or cyclist is in range on these lanes or in the junction.
+/// the nearest is used. A state is empty if no vehicle or cyclist is in range on these lanes, and none is in the
+/// junction.
 std::vector<CornerState> find_corner_states(const ProbeFrame& frame, size_t world, const RoadMap& map,
                                             const BlindCorners& corners, const LineOfSight& line_of_sight,
                                             const PinholeCamera& front, const CornerSearch& search);

@@ -62,7 +62,7 @@ struct PedestrianResults : ProbeResults {
   PedestrianControl control = PedestrianControl::none;
   std::vector<PedestrianPath> paths;    // ordered by scene, step, ego and hider
   std::vector<PedestrianPoint> points;  // ordered by path, then along the path
-  CompiledMaps maps;                    // for figures, as are the cameras
+  CompiledMaps maps;                    // for figures, like `cameras`
   RendererConfig cameras;
 };
 

@@ -82,8 +82,8 @@ struct ProbePair {
   int32_t measured_box = -1;  // box whose visibility is measured; -1: none, and the visibility is NaN
 };
 
-/// Number of cases still to be drawn in each scene. All scenes have equally many cases. The cases are spread evenly
-/// over the scene's samples if every sample offers enough cases.
+/// Number of cases still to be drawn in each scene. The scenes' numbers of cases differ by at most one. The cases are
+/// spread evenly over the scene's samples if every sample offers enough cases.
 class CaseQuota {
  public:
   CaseQuota(int64_t cases, const ProbeOptions& options) : cases_(cases), options_(options) {}

@@ -17,7 +17,7 @@ enum class RemovalControl : uint8_t {
   none,       // the user of the case
   nobody,     // a control: no user, so no response may change
   permuted,   // a control: another road user near the ego, drawn at random for each case; none if there is no other
-  untrained,  // a control: the user, for policies with fresh weights in the same states
+  untrained,  // a control: the user; policies with fresh weights respond in the same states
 };
 constexpr std::array<const char*, 4> kRemovalControlNames{"none", "nobody", "permuted", "untrained"};
 

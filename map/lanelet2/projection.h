@@ -28,9 +28,9 @@ struct UtmZone {
 /// Returns the zone of a place, including the exceptions for Norway and Svalbard. The latitude must be in [-80, 84].
 UtmZone utm_zone_of(const GeoPoint& place);
 
-/// Returns the coordinates of a place in a zone. The place may be outside the zone. Uses Krueger's series in the third
-/// flattening to the sixth order. Its error is below 1e-6 m within 3000 km of the zone's central meridian (Karney,
-/// Transverse Mercator with an accuracy of a few nanometers, 2011).
+/// Returns the coordinates of a place in a zone. The place may be outside the zone. Uses Krueger's series up to the
+/// sixth order of the third flattening. Its error is below 1e-6 m within 3000 km of the zone's central meridian
+/// (Karney, Transverse Mercator with an accuracy of a few nanometers, 2011).
 GridPoint to_utm(const GeoPoint& place, const UtmZone& zone);
 
 /// Place of an MGRS code, such as 54SVE8155012345.

@@ -49,7 +49,7 @@ struct Build {
 };
 
 /// Whether traffic on a side of the road travels towards growing s. The sign of `side` is that of the side's lane ids.
-/// In right-hand traffic, this is true on the right side of the reference line.
+/// Returns true for the right side of the reference line in right-hand traffic.
 constexpr bool travels_forward(const FileRoad& road, int side) { return (side < 0) != road.left_hand; }
 inline bool travels_forward(const FileRoad& road, const FileLane& lane) {
   return travels_forward(road, lane.id) != (lane.direction == LaneDirection::reversed);

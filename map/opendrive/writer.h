@@ -10,8 +10,8 @@
 namespace pictura::opendrive {
 
 /// Returns a network as OpenDRIVE text. Numbers have enough digits to be read back as the same double. So the text does
-/// not change if it is read and written again. Data that a Network lacks is not written: names, weights and materials
-/// of marks, and all objects except crosswalks, parking spaces and stop lines.
+/// not change if it is read and written again. Data that a Network lacks is not written: names of roads, junctions and
+/// controllers, materials of marks, and all objects except crosswalks, parking spaces and stop lines.
 std::string write_opendrive(const Network& network);
 
 }  // namespace pictura::opendrive

@@ -93,7 +93,8 @@ inline Curve biarc(const Pose& from, const Pose& to) {
 inline constexpr double kNoRadiusLimit_m = 1e9;  // value of max_radius_m without a limit
 
 /// Returns a fillet: a line, an arc and a line, tangent to each other. The radius is as large as fits, but at most
-/// `max_radius_m`. Returns a biarc instead if the tangents at the poses do not intersect between the poses.
+/// `max_radius_m`. Returns a biarc instead if the turn is less than 0.1 rad, or if the tangents at the poses do not
+/// intersect between the poses.
 inline Curve fillet(const Pose& from, const Pose& to, double max_radius_m) {
   constexpr double kMinTurn_rad = 0.1, kMinLine_m = 1e-7;
   const double turn = wrap_to_pi(to.heading - from.heading);

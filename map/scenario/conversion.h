@@ -49,8 +49,8 @@ struct Conversion {
 std::vector<CurvePoint> cut_into_pieces(Conversion* conversion, const std::vector<CurvePoint>& points,
                                         const std::string& what);
 
-/// Converts points to points relative to the origin, cut into pieces and thinned. Returns an empty line if there are
-/// fewer than two points. Throws Error, which names `what`, if a point is too far from the origin.
+/// Returns a line through the points, relative to the origin, cut into pieces and thinned. Returns an empty line if
+/// there are fewer than two points. Throws Error, which names `what`, if a point is too far from the origin.
 std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& points, const std::vector<double>& widths,
                                   const std::string& what);
 

@@ -62,7 +62,8 @@ enum class RecordedLightState : uint8_t {
 };
 const char* to_string(RecordedLightState state);
 
-/// A recorded traffic light: the lanes that it controls, and its stop line across the starts of these lanes.
+/// A recorded traffic light: the lanes that it controls, and its stop line (by default across the starts of these
+/// lanes).
 struct RecordedLight {
   Vec3 stop_a_m, stop_b_m;     // left end first as seen by traffic
   float stop_heading_rad = 0;  // travel direction of the controlled traffic

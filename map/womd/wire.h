@@ -43,7 +43,8 @@ class WireReader {
   }
 
   /// Reads only the tag and the length of the next field; the field's value may be beyond the bytes of this reader.
-  /// Returns the size of the tag (including the length prefix of a bytes field) and the size of the value, in bytes.
+  /// Returns the size of the tag (including the length prefix of a bytes field, or the value of a varint) and the size
+  /// of the remaining value, in bytes.
   std::pair<std::size_t, uint64_t> next_extent() {
     const std::size_t before = rest_.size();
     take_tag();

@@ -21,8 +21,8 @@ class PolicyExecutor {
   /// be freed.
   virtual int64_t memory_bytes() const = 0;
 
-  /// Writes the slots for which asked(slot) is true to slots_out, in ascending order, and returns their number.
-  /// slots_out must have room for all slots of the simulator.
+  /// Writes to slots_out, in ascending order, the slots for which asked(slot) is true. Returns their number. slots_out
+  /// must have room for all slots of the simulator.
   virtual int64_t select_deciding(const DecidingSlots& asked, Span<int64_t> slots_out, Stream stream = {}) = 0;
   /// Chooses the actions of `slots`. log_probs: [slots.size(), kNumActions]; actions_out: [all slots of the simulator],
   /// in which actions of other slots remain unchanged.

@@ -23,9 +23,10 @@ class Controller {
 
   /// Writes commands_out [slots] for the step that follows the state in `input`. Commands of slots whose element of
   /// mask [slots] is 0 stay unchanged, so that several controllers can share a simulator; an empty mask selects all
-  /// slots. Commands of inactive agents have no meaning. In host memory, the call is synchronous. In device memory, the
-  /// call puts work on the stream and neither waits nor allocates. A CUDA graph can then capture it, unless name() ends
-  /// in "on the host". Throws Error if the size of an array differs from the simulator's number of slots.
+  /// slots. Inactive agents obey at most the command `recorded`; see Command. In host memory, the call is synchronous.
+  /// In device memory, the call puts work on the stream and neither waits nor allocates. A CUDA graph can then capture
+  /// it, unless name() ends in "on the host". Throws Error if the size of an array differs from the simulator's number
+  /// of slots.
   virtual void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
                    Stream stream = {}) = 0;
 };

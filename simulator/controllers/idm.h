@@ -1,4 +1,4 @@
-// Intelligent driver model (IDM): agents follow recorded paths or lanes, and keep a distance to obstacles on their
+// Intelligent driver model (IDM): agents follow recorded paths or lanes, and keep a distance from obstacles on their
 // path. Runs only on the host.
 #pragma once
 

@@ -79,7 +79,7 @@ PICTURA_HD inline AgentRecord edited_agent(const AgentStateView& agents, const S
 }
 
 /// Fault of an element of an edit, encoded in one 64-bit word that a host can read atomically. It contains the index of
-/// the field or one of the constants below, the index of the element, and the slot.
+/// the field (or kNoSuchSlot or kSlotAgain), the index of the element, and the slot.
 constexpr int64_t kNoEditFault = -1;
 constexpr int32_t kNoSuchSlot = static_cast<int32_t>(AgentField::none), kSlotAgain = kNoSuchSlot + 1;
 PICTURA_HD constexpr int64_t edit_fault(int32_t what, int32_t element, int32_t slot) {

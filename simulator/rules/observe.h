@@ -57,8 +57,8 @@ PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFra
 }
 
 /// Finds the partners of `agent`: the nearest other boxes by distance from the agent's reference point to their
-/// centres. Searches the nearest cells first. If these contain too few boxes, it searches all cells in range; in a
-/// world with many boxes, it doubles the range instead.
+/// centres. Searches the nearest cells first. If these contain too few boxes, it searches all cells within
+/// kPartnerRange_m; in a world with many boxes, it doubles the search radius instead.
 template <typename ThreadGroup>
 PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) {
   using Nearest = typename ThreadGroup::template Nearest<kMaxPartners>;

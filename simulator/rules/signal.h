@@ -139,7 +139,7 @@ PICTURA_HD inline bool is_lane_change(const MapView& map, int32_t before, int32_
 /// or the agent, with its bumper already past the line, changes from a lane without a light to a lane of this light. An
 /// event counts only if the agent is on the line's level, its heading is within 45 degrees of the line's direction, and
 /// its bumper is within 10 m of the line's middle. It is no violation to stand on a line that turns red, to clear the
-/// junction behind the line, or to enter the next lane of the route.
+/// junction past the line, or to enter the next lane of the route.
 PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossing& crossing, LightState state) {
   if (state != LightState::red) return false;
   const StopLine& line = map.stop_lines[light];

@@ -51,8 +51,8 @@ PICTURA_HD inline bool ends_way(const WorldView& world, int agent) {
          is_at_route_end(world.map, {world.agents.goal_lane[slot], world.agents.goal_lane_s_m[slot]});
 }
 
-/// Tests whether the motion from `from` to `to` passes waypoints; returns event bits. The goal of the metric Goals is a
-/// chain's last waypoint, from the time at which it is the next waypoint. It remains the goal until it is passed within
+/// Tests whether the motion from `from` to `to` passes waypoints; returns event bits. A chain's last waypoint becomes
+/// the goal of the metric Goals when it becomes the next waypoint. It remains the goal until it is passed within
 /// kMetricGoalRadius_m, or until the next chain's last waypoint replaces it. So an agent can still reach it after
 /// passing it at the larger distance that the reward accepts.
 template <typename ThreadGroup>

@@ -16,9 +16,9 @@ struct Launch {
 };
 
 /// Reads the launch from the variables that torchrun sets: RANK, WORLD_SIZE, LOCAL_RANK (default: RANK), MASTER_ADDR
-/// (127.0.0.1) and MASTER_PORT (29500). Otherwise reads it from the variables of SLURM's srun; MASTER_ADDR then
-/// defaults to the first host of the step. Without any of these variables, there is one process. Throws Error naming a
-/// variable that is missing or invalid.
+/// (127.0.0.1) and MASTER_PORT (29500). Without RANK and WORLD_SIZE, reads it from the variables of SLURM's srun;
+/// MASTER_ADDR then defaults to the first host of the step. Without any of these variables, there is one process.
+/// Throws Error naming a variable that is missing or invalid.
 Launch launch_from_environment();
 
 /// Returns the first host of a SLURM list: "node7" of "node[7-9,12],other".

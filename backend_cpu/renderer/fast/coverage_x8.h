@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// Version of row_span() for the rows y to y + 7.
+/// Results of row_span() for the rows y to y + 7.
 struct alignas(32) RowSpansX8 {
   int32_t begin[kLanes], end[kLanes], full_begin[kLanes], full_end[kLanes];
 };

@@ -23,7 +23,7 @@ struct RowFrame {
   }
 
  private:
-  // The unused floats are -0, because x + -0 is x for every x, even for -0.
+  // Unused floats of minus_origin are -0, because x + -0 is x for every x, even for -0.
   PICTURA_HD RowFrame(const EgoFrame& frame, Vec3 second_origin_m)
       : minus_origin(set8(-frame.origin_m.x, -frame.origin_m.y, -frame.origin_m.z, -0.0f, -second_origin_m.x,
                           -second_origin_m.y, -second_origin_m.z, -0.0f)),
