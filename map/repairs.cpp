@@ -42,7 +42,7 @@ Text text_of(RepairKind kind) {
     case RepairKind::height_jump: return {"jumps of the elevation", "spread over ten metres, or ten times their size"};
     case RepairKind::strip_surface: return {"cross-sections of strips", "flattened"};
     case RepairKind::missing_lane_type:
-      return {"lanes without a type", "of type none in the center, special lanes elsewhere"};
+      return {"lanes without a type", "center lanes get type none, others are special lanes"};
     case RepairKind::unknown_lane_type: return {"unknown lane types", "counted as special lanes"};
     case RepairKind::unknown_direction: return {"unknown lane directions", "counted as standard"};
     case RepairKind::unknown_flag: return {"flags that are neither true nor false", "counted as false"};
@@ -67,9 +67,9 @@ Text text_of(RepairKind kind) {
     case RepairKind::wrong_end: return {"links to the wrong end of a road", "the end that touches counts"};
     case RepairKind::one_sided_link: return {"links of roads that are not returned", "made mutual"};
     case RepairKind::unreturned_link:
-      return {"links to a road's end that is linked to another road", "kept, because the ends touch"};
+      return {"links to a road's end that is itself linked to a third road", "kept, because the ends touch"};
     case RepairKind::contrary_link:
-      return {"links to a road's end that is linked elsewhere, without touching it", "left out"};
+      return {"links to a road's end that is linked elsewhere and does not touch", "left out"};
     case RepairKind::dangling_link:
       return {"links of lanes at an end of their road that is linked to nothing", "left out"};
     case RepairKind::unlike_link: return {"links of lanes of unlike types", "left out"};
@@ -87,7 +87,7 @@ Text text_of(RepairKind kind) {
     case RepairKind::unlisted_light: return {"lights that the controllers of their junction leave out", "left out"};
     case RepairKind::laneless_light: return {"lights without a lane", "left out"};
     case RepairKind::missing_link:
-      return {"lanes that end without a link where others begin", "routes end before them"};
+      return {"lanes that end without a link where others begin", "routes end with the lane that lacks a link"};
     case RepairKind::repeated_element: return {"element ids used twice", "the first counts"};
     case RepairKind::missing_element: return {"references to elements that do not exist", "left out"};
     case RepairKind::missing_position: return {"points without a position", "left out"};

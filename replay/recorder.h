@@ -24,7 +24,8 @@ struct RecorderOptions {
 /// Draws one agent's images with the CPU renderer.
 class AgentCameras {
  public:
-  /// Creates a renderer with this configuration, except its device and samples. The simulator must outlive this object.
+  /// Creates a renderer with this configuration, but on the host and with exact coverage. The simulator must outlive
+  /// this object.
   AgentCameras(Simulator& simulator, RendererConfig config);
   ~AgentCameras();
 
@@ -75,8 +76,8 @@ class Recorder final : public StepObserver {
   /// Returns the recording so far, without images that are not yet compressed. The last frame is the simulator's
   /// current state.
   const Replay& recorded() const;
-  /// Sets the origin of the replay. Overwrites the entries that the simulator determines: map, seed, world, step
-  /// duration and light cycles.
+  /// Sets the origin of the replay. Its map, seed, world, step duration and light cycles are taken from the simulator,
+  /// not from `origin`.
   void set_origin(ReplayOrigin origin);
   /// Discards all frames except the last, which becomes the first frame of the recording. Metrics continue. Throws
   /// Error if the recorder follows an agent.

@@ -182,7 +182,7 @@ struct ReplayImages {
 struct ReplayOrigin {
   std::string command, commit, version;
   std::string map, map_hash;
-  // File coordinates of the map's (0, 0, 0); zero in replay files that lack them.
+  // The map's origin in the coordinates of the map file; zero in replay files without this value.
   std::array<double, 3> map_origin_m{};
   std::string policy, policy_hash;
   std::string light_cycles;  // from light_cycles_text(); empty in files that lack them

@@ -25,10 +25,11 @@ constexpr double kMaxAbsLogRatio = 1e-3, kMaxClipFraction = 1e-3;
 
 /// Statistics of an update.
 struct UpdateStats {
-  LossStats all;                      // means over the update's minibatches
-  LossStats first;                    // losses of the first minibatch, before the parameters change
-  std::optional<LossStats> rejected;  // `first` before log-probabilities were recomputed, if they were
-  std::vector<LossStats> epochs;      // means over each epoch's minibatches
+  LossStats all;    // means over the update's minibatches
+  LossStats first;  // losses of the first minibatch, before the parameters change
+  std::optional<LossStats>
+      rejected;                   // value of `first` before log-probabilities were recomputed; empty if they were not
+  std::vector<LossStats> epochs;  // means over each epoch's minibatches
   GradientNorms gradient_norms;
   double learning_rate = 0;
   double explained_variance = 0;  // share of the returns' variance that values explain, over all valid transitions

@@ -24,7 +24,8 @@ class RunTime {
   bool would_exceed_limit(RunWork work) const;
   /// Records the duration of one update or evaluation.
   void add(RunWork work, double seconds);
-  /// Scales the expected duration of work by `times`, until it is measured again.
+  /// Multiplies the expected durations of updates and evaluations by `times`. The next measured update replaces that of
+  /// updates.
   void scale_expected_duration(double times);
   /// Limits progress->eta_s to the remaining time.
   void limit_eta(TrainProgress* progress) const;

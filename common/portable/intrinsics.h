@@ -1,4 +1,4 @@
-// Scalar operations that take one or few instructions on a CUDA device. Results on host and device are bitwise equal.
+// Scalar operations that take one or a few instructions on a CUDA device. Results on host and device are bitwise equal.
 #pragma once
 
 #include "pictura/common/portable/hd.h"

@@ -224,8 +224,8 @@ PICTURA_HD inline void strip_corners(const Strip& strip, Vec3* corners_out) {
 struct Widening {
   Vec2 across;  // unit vector from the strip's right side to its left; 0 if the strip is a point on screen
   float floor_px = 0;
-  /// Displacement on screen of the left corner of one end of the strip, given the offset from the end's right corner to
-  /// its left corner. The right corner moves by the opposite displacement.
+  /// Returns the displacement on screen of an end's left corner. gap_px leads from the end's right corner to its left
+  /// corner. The right corner moves by the opposite displacement.
   PICTURA_HD Vec2 push_px(Vec2 gap_px) const {
     const float width_px = dot(gap_px, across);
     const float missing_px = 0.5f * max_no_nan(floor_px - fabsf(width_px), 0.0f);
@@ -291,8 +291,8 @@ constexpr float kEqualDepth = 1e-4f;
 /// solid's base is at most this far from the strip's plane. The distance is not 0, because upright boxes cut into
 /// slopes.
 constexpr float kStanding_m = 0.5f;
-/// Maximum distance by which solids that stand on a strip extend below its plane. Only culling uses this distance: if a
-/// strip is seen from below, an occluder hides the strip only if the occluder is also in front of these solids.
+/// Maximum distance by which solids that stand on a strip extend below its plane. Only culling uses this distance: to
+/// hide a strip that is seen from below, an occluder must also be in front of these solids.
 constexpr float kThroughStrip_m = 4.0f * kStanding_m;
 
 /// Rank of a strip: where strips on one level overlap, the strip with the lower rank is in front.

@@ -1,5 +1,5 @@
-// Results of policies for removed road users: every case, means by occlusion of the user, and files of both. Includes
-// no torch headers.
+// Responses of policies to the removal of road users: each case, means by the road user's occlusion, and files with
+// both. Includes no torch headers.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ enum class RemovalControl : uint8_t {
   none,       // the user of the case
   nobody,     // a control: no user, so no response may change
   permuted,   // a control: another road user near the ego, drawn at random for each case; none if there is no other
-  untrained,  // a control: the user; policies with fresh weights respond in the same states
+  untrained,  // a control: the user of the case, but the responding policies have fresh weights
 };
 constexpr std::array<const char*, 4> kRemovalControlNames{"none", "nobody", "permuted", "untrained"};
 

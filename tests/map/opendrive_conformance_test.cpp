@@ -109,7 +109,7 @@ std::vector<BrokenRule> broken_rules() {
        cubic(R"(pRange="normalized" aU="1" bU="100")")},
       {"1.7.0:road.geometry.parampoly3.arclength_range", "pRange arcLength, but parameters from 0 to 1",
        cubic(R"(pRange="arcLength" aU="0" bU="100")")},
-      {"1.7.0:road.geometry.parampoly3.normalized_range", "parameters to the length under normalized",
+      {"1.7.0:road.geometry.parampoly3.normalized_range", "pRange normalized, but parameters from 0 to the length",
        cubic(R"(pRange="normalized" aU="0" bU="1")")},
       {"1.7.0:road.geometry.parampoly3.length_match", "a curve of 40 m for 100 m",
        cubic(R"(pRange="normalized" aU="0" bU="40")")},

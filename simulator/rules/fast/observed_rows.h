@@ -42,7 +42,7 @@ static_assert(offsetof(StopLine, right_m) == 3 * sizeof(float) && sizeof(StopLin
 // Float8, and a function's mangled name contains the types of its parameters, but not its return type. The linker could
 // not tell apart functions that differ only in the type Float8 that they return.
 
-/// Writes the row of a partner.
+/// Writes the row of a partner (one of the nearest boxes; docs/reference/observation.md).
 PICTURA_HD inline void write_partner(const AgentBox& box, float speed_mps, const RowFrame& frame, float* row_out) {
   // x, y, z, length, cos, sin, width, height
   const Float8 turnable = permute<0, 1, 2, 5, 3, 4, 6, 7>(load8(&box.center_m.x));
