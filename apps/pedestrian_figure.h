@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// Writes a picture for each path (path_000.png, ...) into a folder. It shows the path from above, coloured by the
+/// Writes a picture (path_000.png, ...) of each path into a folder. It shows the path from above, coloured by the
 /// pedestrian's visibility, and the ego's camera images at five points. Calls `on_path` with the number of completed
 /// paths. Returns the pages for pictura.plot, which draws a chart of each path below its picture. Throws Error, which
 /// names the file, if a picture cannot be written.

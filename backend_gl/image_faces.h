@@ -11,7 +11,7 @@ namespace pictura::gl {
 
 /// Bounds on the ratio of the depth of a strip's corner to the depth of FaceInstance::compared_plane at the same screen
 /// point. The minimum applies beyond the plane's horizon, where the plane counts as infinitely deep. As in the CPU
-/// renderer, the plane counts as at least 1 / kWidenedDepth times as deep as the corner. (The CPU renderer uses the
+/// renderer, the plane's depth counts as at least the corner's depth / kWidenedDepth. (The CPU renderer uses the
 /// nearest corner of the strip for this bound.)
 constexpr float kMinInverseDepth = 1e-4f, kMaxInverseDepth = kWidenedDepth;
 

@@ -5,9 +5,9 @@
 namespace pictura::gl {
 
 /// Vertex shader of faces. Hardware rounds the positions of corners to 1/n of a texel (GL_SUBPIXEL_BITS) but does not
-/// adapt their depths. This tilts the plane of a face. Near the horizon, the error exceeds the distance between strips
-/// of one level. So this shader rounds the positions, and computes depths at the rounded positions. Except for rounding
-/// errors, strips of one plane then have equal depths, wherever their corners are.
+/// adapt their depths. This tilts the plane of a face. Near the horizon, the depth error exceeds the depth difference
+/// between strips of one level. So this shader rounds the positions, and computes depths at the rounded positions.
+/// Except for rounding errors, strips of one plane then have equal depths, wherever their corners are.
 constexpr const char* kFaceVertexShader = R"(#version 450 core
 #extension GL_ARB_shader_viewport_layer_array : require
 layout(location = 0) in vec3 corner0;  // camera coordinates

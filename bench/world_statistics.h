@@ -25,9 +25,9 @@ struct EpisodeValues {
   std::vector<double> values;
 };
 
-/// Measures a map. In worlds with default options and the light timing of training, it counts agents by class, refusals
-/// by reason, unreachable goals, and the events of a uniformly random policy until the episode ends. In worlds with the
-/// light timing of evaluations, it measures the lane-keeping controller, up to the maximum length of an episode.
+/// Measures a map. Counts agents by class, refusals by reason, unreachable goals, and the events of a uniformly random
+/// policy until the episode ends, in worlds with default options and the light timing of training. Measures the
+/// lane-keeping controller in worlds with the light timing of evaluations, up to the maximum length of an episode.
 std::vector<EpisodeValues> measure_worlds(const std::shared_ptr<const RoadMap>& map,
                                           const WorldStatisticsOptions& options);
 

@@ -20,7 +20,7 @@ CLI::Option* add_evaluation_options(CLI::App* command, EvaluateOptions* options_
 /// Adds --sampled, which sets *argmax_out to false.
 CLI::Option* add_sampled_option(CLI::App* command, bool* argmax_out);
 
-/// Adds --average, which selects the average of weights that a checkpoint holds.
+/// Adds --average, which selects a checkpoint's averaged weights.
 CLI::Option* add_average_option(CLI::App* command, bool* average_out);
 
 /// Reports the progress of an evaluation. For a long evaluation, also prints one notice of the expected time and of

@@ -22,7 +22,7 @@ CLI::Validator whole_number(uint64_t low, uint64_t high = kMaxCount);
 CLI::Validator number(double low, double high);
 
 /// Adds an option that takes a number from low to high, which must be whole if T is an integer type. The help shows the
-/// default value of `value`. A default out of range means "not given", and the help does not show it.
+/// initial `value` as the default. A default out of range means "not given", and the help does not show it.
 template <typename T>
 CLI::Option* add_number_option(CLI::App* command, const std::string& flag, T& value, const std::string& help,
                                double low, double high = kMaxCount) {

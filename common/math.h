@@ -42,7 +42,7 @@ PICTURA_HD constexpr Vec3 cross(Vec3 a, Vec3 b) {
 }
 PICTURA_HD inline float length(Vec3 a) { return sqrtf(dot(a, a)); }
 
-/// True unless the value is infinite or NaN.
+/// False if the value is infinite, NaN or above 3.4e38 in magnitude.
 PICTURA_HD inline bool is_finite(float value) { return fabsf(value) <= 3.4e38f; }
 PICTURA_HD inline bool is_finite(Vec2 v) { return is_finite(v.x) && is_finite(v.y); }
 PICTURA_HD inline bool is_finite(Vec3 v) { return is_finite(v.xy()) && is_finite(v.z); }

@@ -1,5 +1,5 @@
-// Descriptions of a configuration's keys for documents. Also sentences on settings without effect, and a configuration
-// with absolute paths.
+// Descriptions of a configuration's keys for documents. In addition: sentences on settings without effect, and a
+// configuration with absolute paths.
 #pragma once
 
 #include <string>

@@ -27,7 +27,7 @@ struct DriverOptions : SessionOptions {
   std::string controller;
   // Creates a controller that the calling program supplies; `controller` is then its name. The controller runs on the
   // host and reads vector observations. If the options define cameras (rig, or width_px and height_px), the last
-  // argument is a renderer for these cameras, which holds the simulator's maps. Without cameras it is null.
+  // argument is a renderer that has these cameras and holds the simulator's maps. Without cameras it is null.
   std::function<std::unique_ptr<Controller>(const DriverOptions&, const Simulator&, Renderer*)> make_own_controller;
   bool argmax = true;
   uint64_t seed = 1;

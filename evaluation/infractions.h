@@ -61,8 +61,8 @@ struct Infraction {
   bool is(Event event) const { return (events & event) != 0; }
 };
 
-/// Collects the infractions of all agents of an evaluation. If the simulator runs on a GPU, the observer copies its
-/// input data to the host at every step.
+/// Collects the infractions of all agents of an evaluation. If the simulator runs on a GPU, the data that the observer
+/// reads are copied to the host at every step.
 class InfractionObserver final : public EvaluationObserver {
  public:
   InfractionObserver();

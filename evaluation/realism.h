@@ -22,7 +22,7 @@ namespace pictura {
 struct RealismTerm {
   double weight = 0;         // the weights of all terms sum to 1
   double low = 0, high = 0;  // values are clamped to this range
-  int bins = 0;              // histogram bins; 0: the feature is an event, which a rollout contains or not
+  int bins = 0;              // histogram bins; 0: the feature is an event, which a rollout contains or lacks
   double smoothing = 0;      // added to the count of every bin
 };
 

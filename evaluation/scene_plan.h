@@ -13,7 +13,7 @@ namespace pictura {
 /// too much (SceneProtocol::max_first_turn_deg). Throws Error if the scene's time step is not 0.1 s.
 std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const SceneProtocol& protocol);
 
-/// Selects the tracks that thinning removes; 1: removed, [tracks]. Thinning removes round((1 - density) n) of the n
+/// Returns for each track, [tracks], 1 if thinning removes it, else 0. Thinning removes round((1 - density) n) of the n
 /// road users other than the self-driving car. Seed and scenario id determine the random choice. Tracks removed at a
 /// density are also removed at every lower density.
 std::vector<uint8_t> select_thinned_tracks(const Scenario& scenario, double density, uint64_t seed);

@@ -10,8 +10,8 @@
 
 namespace pictura {
 
-/// Computes the StandingCounts of worlds that are driven to the end. If the simulator runs on a GPU, the observer
-/// copies its input data to the host at every step.
+/// Computes the StandingCounts of worlds that are driven to the end. If the simulator runs on a GPU, the data that the
+/// observer reads are copied to the host at every step.
 class StandingObserver final : public StepObserver {
  public:
   /// Creates an observer; the simulator's worlds must be at the start of their episodes.

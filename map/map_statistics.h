@@ -1,4 +1,4 @@
-// Statistics of a map's roads that can be compared between towns.
+// Statistics of a map's roads, for comparisons of towns.
 #pragma once
 
 #include <array>

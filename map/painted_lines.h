@@ -20,7 +20,7 @@ struct PaintedLine {
 };
 
 /// Returns the map's markings as they are drawn. Lines that other lines cover completely are removed. Lines that
-/// continue each other with the same width and colour are joined. Points are removed if the line moves by at most
+/// continue each other with the same width and colour are joined. Points are removed if the line then moves by at most
 /// kPaintTolerance_m. Ends of lines and dashes do not move.
 std::vector<PaintedLine> painted_lines(const RoadMap& map);
 

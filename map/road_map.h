@@ -68,7 +68,7 @@ struct Lane {
 enum class MarkColor : uint8_t { white, yellow, red, green, blue, orange, violet, black };
 const char* to_string(MarkColor color);
 
-/// A painted stripe or dash. A double line is two markings, a broken line is many.
+/// A painted stripe or dash. A double line is two markings, and a broken line is many.
 struct Marking {
   IndexRange points;  // in RoadMap::marking_points, at least two
   float width_m = 0;

@@ -19,7 +19,7 @@ std::vector<CurvePoint> part_of(const std::vector<CurvePoint>& line, double begi
 
 double plan_length_m(const std::vector<CurvePoint>& line);
 
-/// Returns dashes that are centred along the line, at least one.
+/// Returns at least one dash; the dashes are centred along the line.
 std::vector<std::vector<CurvePoint>> dashes_of(const std::vector<CurvePoint>& line);
 
 }  // namespace pictura

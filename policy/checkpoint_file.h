@@ -39,7 +39,8 @@ struct CheckpointFile {
   std::string_view data;
 };
 
-/// Builder of a checkpoint. Each add function appends to `data` and stores offset and size in the header.
+/// Builder of a checkpoint. Each add function except add_policy() appends to `data` and stores offset and size in the
+/// header.
 struct CheckpointWriter {
   nlohmann::ordered_json header;
   std::string data;

@@ -26,8 +26,8 @@ struct ConvolutionSize {
 /// Convolution of blocks of images. The bits of its results do not depend on the vector width.
 class DirectConvolution {
  public:
-  /// Whether this number of channels is possible: supports() for outputs of compute(), supports_gradient() for images
-  /// of compute_image_gradient().
+  /// Whether this number of channels is possible: supports() tests that of compute()'s outputs, supports_gradient()
+  /// that of compute_image_gradient()'s images.
   static bool supports(int64_t outputs) { return outputs == 8 || outputs == 16 || outputs == 32; }
   static bool supports_gradient(int64_t channels) { return channels % 8 == 0; }
 

@@ -15,8 +15,8 @@ namespace pictura::host {
 constexpr int64_t kBlockNumbers = 48 * 1024;
 
 /// Computes out = GELU(x + bias), with the exact (error function) GELU. The error is at most 2e-7 max(1, |x + bias|).
-/// Also computes the derivative, slope_out, if it is not null. x, out, slope_out: [rows, channels]; out or slope_out
-/// may be x. bias: [channels].
+/// Also computes the derivative if slope_out is not null. x, out, slope_out: [rows, channels]; out or slope_out may be
+/// x. bias: [channels].
 void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels, float* out, float* slope_out);
 
 /// Backward pass of bias_gelu(). Computes the gradient of x as slope * grad_out, and adds the gradient of the bias to

@@ -43,8 +43,8 @@ at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts
 /// Returns the softmax over tokens. scores: [matrices, tokens, columns].
 at::Tensor token_softmax(const at::Tensor& scores);
 
-/// Whether feature_rows() supports these rows, [..., columns]: they must be f32 on a CUDA device, and the result must
-/// have at most RowSize::kMaxWidth columns.
+/// Whether feature_rows() supports these rows, [..., columns]: they must be f32, be on a CUDA device, and have at most
+/// RowSize::kMaxWidth columns together with their features.
 bool has_fused_row_features(const at::Tensor& rows, const RowFeatures& features);
 /// Returns the features of rows, [..., columns], see row_features.h. With `keeps_rows`, the row itself precedes its
 /// features. The result has this `type` and no gradient.

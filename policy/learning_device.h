@@ -14,7 +14,7 @@ namespace pictura {
 /// Returns the device on which this configuration learns. If there are several devices and the configuration gives no
 /// index, local_rank (the index of the process on this machine) selects the device. Loads torch's CUDA library for a
 /// CUDA device. Throws Error if the configuration cannot learn on this device, or if the simulator or the renderer uses
-/// other memory. The message contains the key of the configuration and the reason.
+/// other memory. The message contains the setting's key and the reason.
 Device open_learning_device(const Config& config, int local_rank = 0);
 
 /// Returns torch's current stream of a device, or null on the host. The network's forward and backward passes are

@@ -10,7 +10,7 @@ struct SavedPolicy : PolicyFacts {
   std::vector<NamedTensor> parameters;
 };
 
-/// Copy stored tensors into fp32 torch tensors on the host; and torch tensors, on any device, into stored tensors.
+/// Copy stored tensors into fp32 torch tensors on the host, and torch tensors on any device into stored tensors.
 std::vector<NamedTensor> to_tensors(const std::vector<StoredTensor>& stored);
 std::vector<StoredTensor> to_stored(const std::vector<NamedTensor>& tensors);
 

@@ -19,8 +19,8 @@ struct Config;
 struct SessionParts;
 
 /// Returns the training configuration with the changes of the options. Device settings of the training configuration
-/// are replaced by those of the options, because they depend on the machine. Unless the options name a renderer, cpu
-/// and cuda become auto, because all three draw the same images.
+/// are replaced by those of the options, because they depend on the machine. Unless the options name a renderer, the
+/// renderers cpu and cuda become auto, because all three draw the same images.
 Config with_session_options(const Config& trained, const SessionOptions& options);
 
 /// Observations of a batch of agents. All arrays are in the memory of the session's device.

@@ -29,7 +29,7 @@ struct SessionParts {
   const Device device;
   const Rig rig;
   const double camera_severity;
-  bool observes_vectors = false;  // adds entity sets to observations, even if the policy reads images
+  bool observes_vectors = false;  // adds vector observations, even if the policy reads images
 
  protected:
   /// Throws Error if the renderer, the scene or views are missing, or if their sizes do not fit the batch.

@@ -33,7 +33,7 @@ class LiveView final : public StepObserver {
   using Decide = std::function<std::optional<ReplayDecision>(int agent)>;
 
   /// Serves the only world of a simulator in host memory. The simulator must outlive the view. Throws UsageError if
-  /// this build lacks the server or the watched agent does not exist, and Error if the port is in use.
+  /// this build lacks the server, or if the watched agent does not exist, and Error if the port is in use.
   LiveView(Simulator& simulator, const LiveViewOptions& options, const ReplayOrigin& origin, Decide decide);
   ~LiveView() override;
 

@@ -21,7 +21,7 @@ struct MapOptions {
   uint64_t wall_seed = 0;
   LightHeads light_heads = LightHeads::as_mapped;
   bool observe_walls = false;    // make walls observable: build rules.near_wall_pieces
-  bool recorded_lights = false;  // include the lights of a recorded scene, see compile_scenario()
+  bool recorded_lights = false;  // include the lights of a recorded scene; see compile_scenario()
   // Maximum length of observed pieces of lanes and boundaries. 0: as in training, pieces are at most 10 m long and
   // deviate at most 0.25 m from curves. Above 0: each part that is straight within 2 cm is cut evenly into pieces of at
   // most this length, as in the paper's evaluation of recorded scenes.

@@ -45,7 +45,7 @@ enum Event : uint8_t {
   kEventWaypoint = 64,     // an intermediate waypoint was passed
   kEventMetricGoal = 128,  // a chain's last waypoint was passed within 2 m
 };
-/// Events that are infractions. By default, they halt the agent, see AfterInfraction.
+/// Events that are infractions. By default, they halt the agent; see AfterInfraction.
 constexpr int kInfractions = kEventCollision | kEventOffRoad | kEventRedLight | kEventWall;
 
 constexpr int kNumWaypoints = 3;

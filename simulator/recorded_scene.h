@@ -43,7 +43,7 @@ WorldSpec scene_world(const CompiledMap& map, int index = 0, uint32_t global_wor
 
 /// Returns [tracks]: 1 for each selected track, else 0. `words` are separated by commas: self or sdc (the self-driving
 /// car), vehicles (other vehicles), others (all except vehicles), all, tracks_to_predict, objects_of_interest, and ids
-/// of tracks. A word may select no track. Throws UsageError for other words.
+/// of tracks. It is no error if a word selects no track. Throws UsageError for other words.
 std::vector<uint8_t> tracks_selected_by(const Scenario& scenario, const std::string& words);
 /// Variant of tracks_selected_by() that also throws UsageError for a word that selects no track.
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words);

@@ -69,7 +69,7 @@ void set_scene_rule(const std::string& assignment, SceneProtocol* protocol_inout
 /// Returns names and values of all rules.
 std::vector<std::pair<std::string, std::string>> rules_of(const SceneProtocol& protocol);
 
-/// Throws UsageError, which names the setting, if a setting is invalid. Examples are steps below 1, a density outside
+/// Throws UsageError, which names the setting, if a setting is invalid. Examples are `steps` below 1, a density outside
 /// (0, 1], and a track id or an unknown word in `control`.
 void check(const SceneProtocol& protocol);
 

@@ -32,8 +32,8 @@ class SceneRecorder final : public StepObserver {
   /// of the agent's box in the world. On roads that end, each life is a track: life k of box b (both counted from 0)
   /// has the id b + k * (number of boxes). self_agent is the agent whose track is the self-driving car; -1: none. In a
   /// world of a recorded scene, ids, types, recorded lights and the self-driving car are those of that scene. An empty
-  /// `id` is replaced by an id made of the map's name, seed, world and episode. Throws UsageError if self_agent was
-  /// never present.
+  /// `id` is replaced by an id made of map name, seed, world and episode. Throws UsageError if self_agent was never
+  /// present.
   Scenario scenario(std::string id = "", int self_agent = -1) const;
 
  private:

@@ -140,7 +140,7 @@ struct SpawnReport {
 
 /// Base class of simulators. Only one thread may use an object at a time; distinct objects are independent.
 ///
-/// Addresses of arrays stay valid until reserve() or set_worlds() must enlarge them; generation() counts these
+/// Addresses of arrays stay valid until reserve() or set_worlds() must enlarge the arrays; generation() counts these
 /// enlargements. Lengths of arrays change with set_worlds().
 ///
 /// A simulator on a CUDA device makes that device current in each call and restores the caller's device. Its calls put

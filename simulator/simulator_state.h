@@ -25,8 +25,8 @@ struct SimulatorState {
   /// Hash of the agents' fields, the light states and the parked cars.
   uint64_t hash(const SimulatorSetup& setup) const;
 
-  /// Copies the state of `count` worlds of another simulator, from `from_world` on, to the worlds from `world` on. Each
-  /// pair of worlds must have equal sizes.
+  /// Copies the state of `count` worlds of another simulator, beginning with `from_world`, to the worlds that begin
+  /// with `world`. Each pair of worlds must have equal sizes.
   void copy_worlds(const SimulatorSetup& setup, int world, const SimulatorState& from, const SimulatorSetup& from_setup,
                    int from_world, int count);
 

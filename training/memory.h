@@ -10,8 +10,8 @@ namespace pictura {
 /// keeps images if they take at most two fifths of its `memory_bytes`.
 bool keeps_images(const Config& config, int num_agents, Device device, int64_t memory_bytes);
 
-/// Returns how many images a rollout of num_steps steps keeps of an agent that is always active. The agent selects an
-/// action every decision_steps steps; images of other steps are not kept.
+/// Returns how many images are kept of an agent that is active in all num_steps steps of a rollout. The agent selects
+/// an action every decision_steps steps; images of other steps are not kept.
 constexpr int64_t num_kept_images(int64_t num_steps, int decision_steps) { return num_steps / decision_steps + 1; }
 
 /// Returns the estimated bytes of simulator, rollout and update for all agents of a configuration. Counts only memory

@@ -29,7 +29,7 @@ class Opponents {
   /// Prepares to drive in the run's simulator, which must outlive this object.
   void enter(const Simulator& simulator);
 
-  /// Returns a mask of the agents that the learner drives after the simulator's last step, u8 [slots].
+  /// Returns a mask of the agents that the learner drives in the simulator's current state, u8 [slots].
   at::Tensor own_slots(const SimulatorArrays& input) const;
   /// Returns the commands of all agents, [slots]. The learner's agents take `own_actions`, [slots]; opponents' agents
   /// take actions that the opponents draw. A later call overwrites the result. On a GPU, waits until the host has read

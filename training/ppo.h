@@ -19,8 +19,8 @@ struct AdvantageFilter {
 };
 
 /// Upper bounds of rounding differences between a rollout's log-probabilities and the learner's, before the first step.
-/// The first limits the mean absolute difference, the second limits the share of ratios outside the clip range. Larger
-/// differences cause the log-probabilities to be recomputed.
+/// kMaxAbsLogRatio limits the mean absolute difference, and kMaxClipFraction the share of ratios outside the clip
+/// range. Larger differences cause the log-probabilities to be recomputed.
 constexpr double kMaxAbsLogRatio = 1e-3, kMaxClipFraction = 1e-3;
 
 /// Statistics of an update.

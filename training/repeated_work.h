@@ -40,8 +40,8 @@ class Graphs {
   Graphs(Device device, bool are_used) : device_(device), are_used_(are_used), memory_(device) {}
 
   bool are_used() const { return are_used_; }
-  /// Captures a graph of the work that `work` enqueues on torch's current stream. This stream must not wait for other
-  /// streams, as the default stream does. Throws Error naming train.graphs if the work cannot be captured, and
+  /// Captures a graph of the work that `work` enqueues on torch's current stream. This stream must not be the default
+  /// stream, which waits for other streams. Throws Error naming train.graphs if the work cannot be captured, and
   /// c10::OutOfMemoryError if memory is too small.
   std::unique_ptr<DeviceGraph> capture(const std::function<void()>& work);
   void launch(DeviceGraph* graph);

@@ -15,7 +15,7 @@
 namespace pictura {
 
 /// Keeper of a run's folder. Only rank 0 reads and writes. Every rank must call each function, because a checkpoint
-/// contains a part of each rank.
+/// contains data of each rank.
 class RunKeeper {
  public:
   /// Claims the folder for this process. Throws Error naming the folder if another run is active in it, or if it holds

@@ -24,8 +24,8 @@ class RunTime {
   bool would_exceed_limit(RunWork work) const;
   /// Records the duration of one update or evaluation.
   void add(RunWork work, double seconds);
-  /// Multiplies the expected durations of updates and evaluations by `times`. The next measured update replaces that of
-  /// updates.
+  /// Multiplies the expected durations of updates and evaluations by `times`. The next update's duration replaces the
+  /// expected duration of updates.
   void scale_expected_duration(double times);
   /// Limits progress->eta_s to the remaining time.
   void limit_eta(TrainProgress* progress) const;

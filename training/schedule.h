@@ -15,7 +15,7 @@ double learning_rate_at(const TrainSection& config, int64_t agent_steps);
 bool schedule_has_ended(const TrainSection& config, int64_t agent_steps);
 
 /// Returns the factor by which logits are multiplied after an update of this number of agent-steps. Logits double every
-/// sharpen_agent_steps, as if the softmax's temperature halved. Agents that start moving only by chance then wait even
+/// sharpen_agent_steps, as if the softmax's temperature halved. Then agents that start moving only by chance wait even
 /// longer, so the policy must learn to start.
 double logit_growth(const TrainSection& config, int64_t agent_steps);
 

@@ -143,9 +143,9 @@ __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t i
           light_ref(index)};
 }
 
-// Clips a lane's face of `count` corners as clip_face does, but in place. This is possible because it reads one corner
-// ahead, and writes at most one corner more than it has clipped. Returns the number of corners, or kTooManyCorners if
-// they do not fit or the face is not exactly convex.
+// Clips a lane's face of `count` corners as clip_face does, but in place. This is possible because this function reads
+// one corner ahead, and writes at most one corner more than it has clipped. Returns the number of corners, or
+// kTooManyCorners if they do not fit or the face is not exactly convex.
 constexpr int kTooManyCorners = -1;
 __device__ inline int clip(const Frustum& f, unsigned crossed, int count, LaneCorners corners) {
   if (crossed == kOutside) return 0;

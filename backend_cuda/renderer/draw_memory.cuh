@@ -15,7 +15,7 @@ constexpr int kDrawThreads = 256, kDrawBlocksPerProcessor = 4;
 constexpr int kDrawPixels = kTileWidth_px * kTileHeight_px, kDrawFragments = 1152;
 // Few images, usually none, exceed the pool of faces and are deferred.
 constexpr int kDeferredBlocksPerProcessor = 2;
-// Blocks of the last launch.
+// Blocks of the overflow launch and of the visibility launch.
 constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 16;
 
 // Number of bits of a 32-bit pixel word that hold a face, and number of faces that these bits can distinguish.

@@ -77,7 +77,7 @@ __device__ inline void load_strips(const FaceSetupContext& context, uint32_t ent
 }
 
 // Makes the face of an entry that is not a light. Returns false if the face has faded to black. strip_of(index) must
-// return a strip.
+// return the strip of that index.
 template <typename StripOf>
 __device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad* quad_out, StripOf&& strip_of) {
   const ImageSetting& setting = context.setting;
@@ -374,7 +374,7 @@ class BestOccluders {
     return chosen;
   }
 
-  // Replaces dropped faces by the chosen added faces. Returns the slot of the lane's own face.
+  // Puts the chosen added faces into the slots of faces that were not chosen. Returns the slot of the lane's own face.
   __device__ int insert(const Offered& own, Chosen chosen) {
     unsigned slots = ~__ballot_sync(kAllLanes, chosen.kept) & ((1u << Occluders::kMaxCount) - 1);
     int slot = 0;

@@ -1,6 +1,6 @@
 // Conversion of an image's faces to fragments. Threads first process the rows of faces. They find, for each pixel, the
-// fully covering face with the largest occluder bound, and list the pixels that faces cover partly. Listed pixels that
-// may be visible become fragments, one thread each, in a linked list per pixel.
+// fully covering face with the largest occluder bound, and list the pixels that faces cover partly. Each listed pair of
+// face and pixel that may be visible becomes a fragment: one thread per pair, one linked list per pixel.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/draw_memory.cuh"
@@ -135,8 +135,8 @@ struct TileSpan {
 };
 
 // Marks, for each pixel of a part, the fully covering face with the largest occluder bound, and lists the partly
-// covered pixels. Neighbouring rows often belong to one large face, so they are spread over the passes. Collective over
-// all threads of the block.
+// covered pixels. Neighbouring rows often belong to one large face, so the lanes of a warp take rows that are far
+// apart. Collective over all threads of the block.
 template <typename Memory>
 __device__ void mark_and_list(const Memory& memory, const Part& part) {
   using Word = typename Memory::Word;
@@ -266,8 +266,8 @@ __device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wan
 
 // Makes all effective samples of a fragment visible initially. A fragment that covers its pixel fully may intersect the
 // pixel's full face, which then becomes a fragment too. Lists the pixels to be composited: those with fragments that
-// are not alone (is_alone()). Records whether any pixel's remainder may have to be divided: whether several fragments
-// cover the pixel fully, and another, which is no sliver, covers it partly. Hardly any pixel has such fragments.
+// are not alone (is_alone()). Records whether divide_remainder() may be needed: whether several fragments cover a pixel
+// fully, and one that is no sliver covers it partly. Hardly any pixel has such fragments.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;
@@ -293,7 +293,7 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     auto is_full = [](const PixelCoverage& coverage) { return coverage.is_full(); };
     auto hides = [](const PixelCoverage& coverage) { return !coverage.is_full() && coverage.samples != 0; };
     const Word first_of_list = first_of_word<Memory>(before);
-    // Among several full fragments, the first of the list finds the others behind it. If the list begins with a
+    // Among several full fragments, the first in the list finds those later in the list. If the list begins with a
     // fragment that another thread has added, that thread decides, because the list may not be linked yet.
     if ((full != Memory::kNone || any_fragment(memory, Word{memory.next[i]}, is_full)) &&
         first_of_list < static_cast<Word>(count) && any_fragment(memory, first_of_list, hides)) {

@@ -22,7 +22,7 @@ __device__ inline int32_t num_drawn_views(const DrawTask& task) {
   return clamp(drawn - task.first_view, 0, task.num_views);
 }
 
-// Leaves an image to the last launch, whose blocks have memory for a whole map.
+// Leaves an image to the last launch, whose blocks have memory for a whole world.
 __device__ inline void mark_overflowed(const DrawTask& task, int32_t image) {
   task.overflow_images[atomicAdd(&task.counters->overflow, 1)] = image;
 }

@@ -56,7 +56,7 @@ struct alignas(16) Ball {
 };
 
 /// Grid of all pieces of one kind (strips or walls) of a map. A piece is only in the cell of its sphere's centre.
-/// Therefore queries visit each piece once, and the pieces of neighbouring cells in a row are contiguous.
+/// Therefore queries visit each piece once, and the pieces of neighbouring cells of one grid row are contiguous.
 struct PieceGrid {
   GridView cells;
   Span<const Ball> balls;  // in the order of cells.items
@@ -147,7 +147,7 @@ constexpr int kMaxEntries = 1536;
 /// per lane.
 struct FaceBatch {
   static constexpr int kEntries = 32;
-  /// Returns the number of batches of this number of entries; the last batch may be partly filled.
+  /// Returns the number of batches for this number of entries; the last batch may be partly filled.
   PICTURA_HD static constexpr int32_t count_of(int32_t entries) { return (entries + kEntries - 1) / kEntries; }
   int32_t image, first_entry;
 };

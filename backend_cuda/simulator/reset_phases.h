@@ -19,9 +19,9 @@ struct TeamMemory {
 /// placed boxes to the standing boxes. The chosen try is the first that the map permits and that is clear of the
 /// standing boxes and of all boxes with lower numbers. So the result equals that of placing the boxes one after the
 /// other. In a turn, kTurn boxes choose at the same time. In each round of a turn, every box that is not yet fixed
-/// chooses again, given the last choices of the other boxes, until no choice changes. Then the choice of every box
-/// agrees with those of the boxes before it, which is true only of the sequential result. Every round fixes at least
-/// the lowest changed box. Choices of an earlier turn do not change.
+/// chooses again, given the last choices of the other boxes, until no choice changes. Then every choice follows from
+/// those of the boxes before it, and only the sequential result has this property. Every round fixes at least the
+/// lowest changed box. Choices of an earlier turn do not change.
 ///   box_of_try(i, try), permits(group, i, try, box)
 template <typename Team, typename BoxOfTry, typename Permits>
 PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,

@@ -20,10 +20,9 @@ struct Comparison {
   Change change = Change::undirected;
 };
 
-/// Compares rows of the same `name` in two reports; rows with a name in only one report are omitted. Rows also have the
-/// keys `value`, `unit`, `min` and `max`. Rates (units "..._per_s") are better if greater; times and memory (s, ms, GB,
-/// GiB) are better if smaller; other units have no direction. A row is better or worse only if the ranges from min to
-/// max do not overlap.
+/// Compares rows of the same `name` and `unit` in two reports; other rows are omitted. Rows also have the keys `value`,
+/// `min` and `max`. Rates (units "..._per_s") are better if greater; times and memory (s, ms, GB, GiB) are better if
+/// smaller; other units have no direction. A row is better or worse only if the ranges from min to max do not overlap.
 std::vector<Comparison> compare_results(const Json& before_rows, const Json& after_rows);
 
 /// An earlier report, which a benchmark printed with --json.

@@ -18,7 +18,7 @@ constexpr double kSharedEdgeError = 3.0 / 255;
 /// and the visibility of each object has a resolution of 1/64.
 constexpr double kWorstOracleError = 16.0 / 255;
 /// Maximum share of pixels whose planes (depth, class, instance) show another surface than the truth. At such pixels,
-/// the centre is on an edge within rounding errors, or strips of two levels cross and are ordered as a whole.
+/// the centre is within rounding errors of an edge, or strips of two levels cross and are ordered as a whole.
 constexpr double kPlaneShare = 1e-3;
 /// Maximum relative error of the depth plane at pixels where the truth has the same kind of surface.
 constexpr double kDepthError = 1e-3;

@@ -1,4 +1,4 @@
-// Copies of host scenes and images in device memory. Their memory is reused between calls.
+// Device copies of host scenes, and images in device memory. Their memory is reused between calls.
 #pragma once
 
 #include <vector>

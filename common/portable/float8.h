@@ -379,8 +379,9 @@ PICTURA_HD inline Float8 reciprocal_in_range(const Float8& a) { return 1.0f / a;
 PICTURA_HD inline Float8 saturate(const Float8& a) { return min_no_nan(max_no_nan(a, 0.0f), 1.0f); }
 
 /// Bit masks that select `count` of eight elements: the first or the last. They select the rest of an array that is
-/// processed in groups of eight: the first elements if the rest is padded to eight, the last if the array's last eight
-/// elements are read instead. first_lanes_mask() accepts any count: above 8, all bits are set; below 0, none.
+/// processed in groups of eight: first_lanes_mask() if the rest is padded to eight elements, last_lanes_mask() if the
+/// array's last eight elements are read. first_lanes_mask() accepts any count: above 8, all bits are set; below 0,
+/// none.
 PICTURA_HD constexpr uint32_t first_lanes_mask(int count) {
   return count >= 8 ? 0xFFu : count <= 0 ? 0u : (1u << count) - 1;
 }

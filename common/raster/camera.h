@@ -69,8 +69,8 @@ PICTURA_HD inline Frustum make_frustum(const PinholeCamera& camera) {
   return f;
 }
 
-/// Returns false if a sphere (camera coordinates) is entirely outside the frustum or beyond the visible range, where
-/// all faces have faded to black.
+/// Returns false if a sphere (camera coordinates) is entirely outside one plane of the frustum or beyond the visible
+/// range, where all faces have faded to black.
 PICTURA_HD inline bool sphere_in_frustum(const Frustum& f, Vec3 center, float radius_m) {
   // No short circuits, because lanes of a warp would diverge.
   const bool in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < kVisibleRange_m);

@@ -1,4 +1,4 @@
-// The checks of every renderer before it draws: of the images to fill, and of scenes in host memory.
+// Checks that every renderer makes before it draws: of the images to fill, and of scenes in host memory.
 #pragma once
 
 #include <string_view>

@@ -82,7 +82,7 @@ class PixelAccumulator {
   }
 
  private:
-  static constexpr float kUnits = 1 << 20;  // units of the value 1; sums of a thousand fragments do not overflow
+  static constexpr float kUnits = 1 << 20;  // units per 1.0; sums of a thousand fragments do not overflow
   PICTURA_HD static int32_t to_units(float value) { return static_cast<int32_t>(value * kUnits + 0.5f); }
   PICTURA_HD float area_of(Kind kind) const { return static_cast<float>(part_[kind].area) * (1.0f / kUnits); }
 

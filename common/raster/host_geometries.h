@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// Map from handles to geometries. Callers must first check handles with check_handle().
+/// Map from handles to geometries. Callers of upload() must first check the handle with check_handle().
 class HostGeometries {
  public:
   /// Copies a geometry, replacing the handle's previous geometry.

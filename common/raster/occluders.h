@@ -69,7 +69,7 @@ struct Occluders {
   /// Whether one occluder hides the part of a face's bounds that is in the image.
   PICTURA_HD bool occludes(const PinholeCamera& camera, const ScreenBounds& bounds) const {
     const Aabb2 box = bounds.in_image(camera);
-    // Minimum over the box of a linear function of the screen.
+    // Minimum, over the box, of a linear function of the screen.
     auto min_over_box = [&](Vec3 of) {
       return of.x * (of.x > 0.0f ? box.low.x : box.high.x) + of.y * (of.y > 0.0f ? box.low.y : box.high.y) + of.z;
     };

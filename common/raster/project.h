@@ -119,8 +119,8 @@ PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f,
 }
 
 /// Projects a clipped face (camera coordinates) of at most kMaxCorners corners; `plane` is the plane of the face. Calls
-/// store_edge as make_edges() does. Sets all members of face_out except those that complete_face() sets. Returns false
-/// if the face covers nothing.
+/// store_edge as make_edges() does. Sets all members of face_out except those that only complete_face() sets. Returns
+/// false if the face covers nothing.
 template <int kMaxCorners, typename Corners, typename StoreEdge>
 PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frustum& f, const Corners& polygon,
                                         int count, const FacePlane& plane, Rgb color, StoreEdge&& store_edge,

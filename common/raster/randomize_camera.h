@@ -70,7 +70,7 @@ PICTURA_HD inline PinholeCamera randomized_camera(const PinholeCamera& in_ego, c
   return ranges.moves_cameras() ? mounted(in_ego, draw_mounting(ranges, key, camera)) : in_ego;
 }
 
-/// Effect on an image's colours: a factor, and noise per pixel and channel. Images of dead cameras and dropped images
+/// Effect on an image's colours: a factor, and noise per pixel and channel. Dropped images and images of dead cameras
 /// are black.
 struct ImageEffect {
   bool is_on = false;

@@ -175,8 +175,8 @@ PICTURA_HD inline bool light_is_visible(const LightHead& head, LightState state,
   return ahead_m > 0.0f && ahead_m * ahead_m >= cosine * cosine * dot(to_eye, to_eye);
 }
 
-/// Corner, in world coordinates, of the polygon that represents a light head. Corner 0 is left of the centre; the next
-/// corners are above it.
+/// Corner, in world coordinates, of the polygon that represents a light head. Corner 0 is left of the centre; corner 1
+/// is above corner 0.
 PICTURA_HD inline Vec3 light_corner(const LightHead& head, int corner) {
   constexpr float kRadius_m = kLightRadius_m * 1.00574110f;  // sqrt(a / sin(a)), a = 2 pi / kLightSides
   const SinCos at = sincos_of(static_cast<float>(corner) * (kTwoPi / kLightSides));

@@ -178,7 +178,7 @@ PICTURA_HD inline bool are_equal_depths(float inverse_depth_a, float inverse_dep
 }
 
 /// Whether face a is in front of face b at a screen point that both cover: the nearer face is in front, or at equal
-/// depths the face with the lower object id. `stands(solid, strip)` evaluates stands_on() for their object ids.
+/// depths the face with the lower object id. `stands(solid, strip)` takes object ids and evaluates stands_on().
 template <typename Stands>
 PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at_px, Stands&& stands) {
   const bool strip_a = is_strip(a), strip_b = is_strip(b);
@@ -187,8 +187,8 @@ PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec
   const bool first = are_equal_depths(inverse_depth_a, inverse_depth_b) ? a.object_id < b.object_id
                                                                         : inverse_depth_a > inverse_depth_b;
   if (strip_a == strip_b) return first;
-  // Judged by depth, the solid is beneath the strip. If the solid stands on the strip, it only cuts into the road, and
-  // the order is reversed.
+  // If, judged by depth, the solid is beneath the strip but stands on it, the solid only cuts into the road, and the
+  // order is reversed.
   const bool is_strip_first = first == strip_a, is_from_below = is_strip_from_below(strip_a ? a : b);
   if (is_strip_first == is_from_below) return first;
   return stands(strip_a ? b.object_id : a.object_id, strip_a ? a.object_id : b.object_id) ? !first : first;

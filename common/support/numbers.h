@@ -1,6 +1,6 @@
-// Parser of all numbers that users write: options of commands, overrides of configurations, names of maps. It accepts
-// only decimal numbers. Integers may have any decimal notation: 1000, 1e3, 1000.0 and 0010 are accepted; 0x10, 1_000,
-// nan and inf are not.
+// Parser of all numbers that users write in options of commands, overrides of configurations and names of maps. It
+// accepts only decimal numbers. Integers may have any decimal notation: 1000, 1e3, 1000.0 and 0010 are accepted; 0x10,
+// 1_000, nan and inf are not.
 #pragma once
 
 #include <cstdint>

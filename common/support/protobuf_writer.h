@@ -22,7 +22,7 @@ inline void append_varint(uint64_t value, std::string* out) {
   out->push_back(static_cast<char>(value));
 }
 
-/// Appends an integer. `field` is the field's number, or an enumeration's value.
+/// Appends an integer. `field` is the field's number, as an integer or an enumerator.
 template <typename Field>
 void append_integer(Field field, uint64_t value, std::string* out) {
   append_varint(static_cast<uint64_t>(field) << 3, out);

@@ -16,7 +16,7 @@ struct CornerOptions : ProbeOptions {
     batch = 256;
     worlds.adds_walls = true;  // walls make the corners blind
   }
-  int64_t pairs = 200;  // maximum total number, taken from all scenes in turn
+  int64_t pairs = 200;  // maximum total number; pairs are taken from all scenes in turn
   CornerSearch search;
   CornerControl control = CornerControl::none;
 };

@@ -14,7 +14,7 @@ void add_means(const ResponseMeans& means, Json* json_out);
 /// scene's driver.
 Json policies_json(const ProbeResults& results, const std::vector<int32_t>& drivers);
 
-/// Adds the worlds, their drivers and driving mode, and the duration.
+/// Adds the settings of worlds, driver and device, whether the probe was interrupted, and its duration.
 void add_setting(const ProbeResults& results, Json* json_out);
 
 /// Returns the text of a summary, which consists of `json`, the setting, and to_json(row) of each row.

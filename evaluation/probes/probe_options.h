@@ -28,7 +28,7 @@ struct ProbeOptions {
   // and may be missing if only files follow.
   std::vector<std::function<std::unique_ptr<PolicySession>(const DriverOptions&)>> make_own_policies;
   int sample_steps = 10;  // number of steps between sampled states
-  int batch = 4096;       // cases per call, rounded up to whole passes; affects only memory and time
+  int batch = 4096;  // cases computed together, rounded up to whole passes of a network; affects only memory and time
 };
 
 /// Visits the options of all probes except policies, worlds and devices.

@@ -34,8 +34,8 @@ void visit_options(RemovalOptions& options, Visitor&& v) {
 /// Drives evaluation worlds, which equal the worlds of evaluate() with the same scenario numbers. The world
 /// configuration is that of the first policy: its population, walls and conditioning apply to all policies. Every
 /// `sample_steps` steps the probe draws distinct pairs of an ego and a user from the state. The ego is an active
-/// vehicle; the user is another active or halted agent within range_m. Parked cars are not drawn as users. Each policy
-/// gets two inputs: one of the unchanged state, and one with the user hidden from this ego. Vectors come from
+/// vehicle; the user is another active or halted agent within range_m. Parked cars are never users. Each policy gets
+/// two inputs: one of the unchanged state, and one with the user hidden from this ego. Vectors come from
 /// Simulator::observe, images from a view with or without the user. Each policy reads images as in its training.
 /// Occlusion is measured in the cameras of the first policy that reads images, or in the paper's cameras if no policy
 /// reads images. An interrupt ends the probe with the completed cases. Throws UsageError if the number of scenes is not

@@ -44,7 +44,7 @@ struct MgrsPlace {
 /// the text is not such a code, or if the square does not exist.
 std::optional<MgrsPlace> parse_mgrs(std::string_view code);
 
-/// Returns the PROJ string of UTM coordinates minus `shift_m`.
+/// Returns the PROJ string for UTM coordinates from which `shift_m` is subtracted.
 std::string proj_string_of(const UtmZone& zone, const GridPoint& shift_m);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
 // Positions relative to a reference line, which consists of OpenDRIVE's lines, arcs, spirals and plane cubics. Also
-// evaluates the cubics of elevation, banking, offsets and widths. Numbers are doubles in file coordinates.
+// values of the cubics of elevation, banking, offsets and widths. Numbers are doubles in file coordinates.
 #pragma once
 
 #include <cmath>
@@ -111,9 +111,9 @@ constexpr int inner_border(int lane_id) { return lane_id > 0 ? lane_id - 1 : lan
 std::vector<double> formula_changes(const FileRoad& road, const FileSection& section, int border, double begin,
                                     double end);
 
-/// Returns the breaks of formula_changes(). For each interval between breaks, also returns an upper bound of the second
-/// derivatives of the lane's width and of positions. The bound holds for positions on the lane and up to `beyond_m`
-/// outside its borders.
+/// Returns the breaks of formula_changes(). Unless the road is banked, also returns an upper bound of the second
+/// derivatives of the lane's width and of positions for each interval between breaks. The bound holds for positions on
+/// the lane and up to `beyond_m` outside its borders.
 CurveBreaks breaks_of(const FileRoad& road, const FileSection& section, int lane, double begin, double end,
                       double beyond_m = 0);
 

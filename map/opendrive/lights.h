@@ -10,7 +10,7 @@ namespace pictura::opendrive {
 /// Type of signals that are traffic lights.
 inline constexpr std::string_view kLightType = "1000001";
 
-/// Whether a signal or signal reference applies to a lane of its road. Its validity takes precedence over its
+/// Whether a signal or signal reference applies to a lane of its road. A signal's validity takes precedence over its
 /// orientation.
 bool applies_to(const FileLane& lane, const FileRoad& road, Orientation orientation,
                 const std::vector<LaneRange>& validity);

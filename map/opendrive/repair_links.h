@@ -7,8 +7,8 @@
 
 namespace pictura::opendrive {
 
-/// Repairs links as action_of() describes. Afterwards the targets of all road links, the junctions of all roads and
-/// both roads of all connections exist. Contact points are known, and Connection::incoming_end is set.
+/// Repairs links as action_of() describes. Afterwards, all targets of road links, junctions of roads, and roads of
+/// connections exist. Contact points are known, and Connection::incoming_end is set.
 void repair_links(Network* network, Faults* faults);
 
 }  // namespace pictura::opendrive

@@ -1,5 +1,5 @@
-// Operations on lane sections: splits and removes sections, and ends profiles. After a split, a lane of the file has
-// one FileLane in each part; the later ones are marked is_continued.
+// Splits and removes lane sections, and makes profiles constant from a station on. After a split, a lane of the file
+// has one FileLane in each part; the later ones are marked is_continued.
 #pragma once
 
 #include <vector>

@@ -16,8 +16,8 @@ struct Jump {
   Eigen::Vector2d shift_m{0, 0};  // from the end of the previous geometry to the start of this one
 };
 
-/// Whether a road is long enough for smoothing a jump: if the jump is spread over the whole road, it turns the line by
-/// at most 0.2 rad.
+/// Whether a road is long enough for smoothing a jump: spread over the whole road, the jump turns the line by at most
+/// 0.2 rad.
 bool can_spread_jump(double jump_m, double road_length_m);
 
 /// Moves the reference line around each jump so that the jump vanishes. Before a jump, the line moves towards the

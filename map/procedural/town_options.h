@@ -33,7 +33,7 @@ struct TownOptions {
   double sidewalks = 0.95;         // fraction of the streets that have sidewalks
   double parking = 0.4;            // fraction of sides with parking bays, among the sides of single-lane streets
   double lights = 0.8;             // fraction of the crossings (except roundabouts) that have lights
-  double far_side = 0.5;           // fraction of the crossings with lights whose light heads are beyond the junction
+  double far_side = 0.5;  // fraction of crossings whose light heads are beyond the junction, among those with lights
 };
 
 /// A numeric option of towns: its name in commands and map names, its range [low, high] and its help text.

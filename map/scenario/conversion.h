@@ -1,6 +1,5 @@
-// Stages, in the order of execution, of make_scenario(), which converts a recorded scene to a scenario. Each stage
-// fills its own parts of the scenario, and may read parts of earlier stages. docs/reference/scenario.md lists the
-// rules.
+// Stages of make_scenario() in the order of execution; it converts a LoggedScene to a Scenario. Each stage fills its
+// own parts of the scenario, and may read parts of earlier stages. docs/reference/scenario.md lists the rules.
 #pragma once
 
 #include <cstdint>

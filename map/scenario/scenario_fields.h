@@ -17,7 +17,7 @@ PICTURA_FIELDS(ConversionNote, what, count, first)
 PICTURA_FIELDS(Scenario, id, format, dt_s, num_steps, current_step, sdc_track, map, tracks, states, valid, driven,
                objects_of_interest, tracks_to_predict, lights, light_lanes, light_states, notes)
 
-/// Maximum distance of positions from a scene's origin. Recordings extend over some hundred metres.
+/// Maximum distance of positions from a scene's origin. Recordings extend over a few hundred metres.
 constexpr float kMaxScenarioRadius_m = 1e4f;
 constexpr float kMaxTrackSize_m = 100.0f;
 

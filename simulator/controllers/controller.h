@@ -1,5 +1,4 @@
-// Common interface of controllers, which command agents: random and idle controllers, lane keeping, policies,
-// recordings.
+// Common interface of controllers (random, idle, lane keeping, policies, recordings), which command agents.
 #pragma once
 
 #include <string_view>

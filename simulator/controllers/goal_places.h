@@ -25,10 +25,10 @@ struct GoalReach {
   int64_t agents = 0, waypoints = 0, unreachable = 0;
 };
 
-/// Tests, before a world's first step, the first `chains` chains of each of its active agents. Element 0 of the result
-/// counts vehicles and cyclists, element 1 pedestrians. A waypoint on a lane is reachable if the lane graph has a route
-/// of at most 120 m to it from the previous waypoint. A waypoint on a walkway is reachable if no wall or parked car
-/// covers it, and if a pedestrian of maximum size can follow walkways to it without touching a wall.
+/// Before a world's first step, tests the first `chains` chains of each active agent. Element 0 of the result counts
+/// vehicles and cyclists, element 1 pedestrians. A waypoint on a lane is reachable if the lane graph has a route of at
+/// most 120 m to it from the previous waypoint. A waypoint on a walkway is reachable if no wall or parked car covers
+/// it, and if a pedestrian of maximum size can follow walkways to it without touching a wall.
 std::array<GoalReach, 2> follow_goals(const WorldView& world, const LaneGraph& graph, uint32_t chains);
 
 }  // namespace pictura

@@ -43,8 +43,8 @@ class LaneKeepingAgent {
  private:
   // Computing a search node takes 1 to 4 us. On maps whose roads end, an agent's search takes at most 10 ms per step; a
   // few vehicles then find no plan for the tightest curves (docs/research/public_maps.md). On other maps, a plan may
-  // need 130,000 nodes. There, the searches of an agent take at most 0.9 s in a single step, and at most 1 ms per step
-  // averaged over a long run.
+  // need 130,000 nodes. There, the searches of an agent took at most 0.9 s in a single step, and at most 1 ms per step
+  // averaged over a long run (measured).
   static constexpr size_t kMaxSearchNodes = 300'000, kMaxSearchNodesOfOpen = 2'000, kSearchNodesPerStep = 500,
                           kMinSearchNodes = 20'000;
 

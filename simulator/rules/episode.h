@@ -29,8 +29,8 @@ PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& co
   return is_valid(command) && (has_record(world.map) || !is_follow_record_command(command));
 }
 
-/// Whether a step of the agent is counted and used for learning. The agent must take actions, and the command must be
-/// neither to leave nor to follow the record. In this episode, the agent must be neither impaired nor driven by another
+/// Whether a step of the agent is counted and used for learning. The agent must take actions, and its command must not
+/// be to leave or to follow the record. In this episode, the agent must be neither impaired nor driven by another
 /// policy.
 template <typename CommandType>
 PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType& command) {
@@ -40,7 +40,7 @@ PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType&
 
 /// Whether the agent counts as active when its world tests whether the episode ends. Agents that wait to enter count.
 /// Absent agents of a map with a record count too, because they may appear later. They do not count if some tracks are
-/// replayed, because all agents are then present from the start.
+/// replayed, because agents absent at the start then take no part in the episode.
 PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
   const auto status = world.agents.status[world.first_slot + agent];
   if (has_replayed_tracks(world.map)) return takes_actions(status);
@@ -110,7 +110,7 @@ PICTURA_HD inline void count_agent(const WorldView& world, int agent, const Step
 
 /// Returns the maximum number of steps of the world's current episode: options.episode_steps. With stagger_episodes, a
 /// world's first episode has U{64, ..., episode_steps} steps instead, so that episodes of different worlds do not end
-/// at the same time. If episode_steps is at most 64, all episodes have this length.
+/// at the same time. If episode_steps is at most 64, the first episode has episode_steps steps too.
 PICTURA_HD inline int max_steps_of(const WorldView& world) {
   constexpr int kMinSteps = 64;
   const int episode_steps = world.options.episode_steps;

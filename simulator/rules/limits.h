@@ -26,7 +26,7 @@ PICTURA_HD constexpr ClassLimits class_limits(AgentClass agent_class) {
 }
 
 /// Maximum speed of any class. Recorded traffic may be faster and larger, so the rules use MapView::max_speed_mps and
-/// MapView::max_box_radius_m instead of these constants.
+/// MapView::max_box_radius_m instead of this constant and the next.
 constexpr float kMaxSpeed_mps = 20.0f;
 /// Maximum half-diagonal of a box of any class.
 constexpr float kMaxBoxRadius_m = 3.2f;

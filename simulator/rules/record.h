@@ -92,8 +92,8 @@ PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const
   world.boxes_before[agent] = goes_on ? before : world.boxes[agent];
 }
 
-/// Returns the state of replayed track i `step` steps after its episode's start. It is absent if the map has at most i
-/// replayed tracks.
+/// Returns the state of replayed track i `step` steps after its episode's start. Its is_present is 0 if the map has at
+/// most i replayed tracks.
 PICTURA_HD inline RecordedState replayed_state(const MapView& map, int i, int step) {
   const int agent = map.first_replayed + i;
   return agent < static_cast<int>(map.recorded_agents.size()) ? recorded_state(map, agent, step) : RecordedState{};

@@ -96,7 +96,8 @@ PICTURA_HD inline bool holds(const StopLine& line, Vec2 forward, float z_m) {
   return dot(forward, line.direction) >= kStopLineCosine && fabsf(line.middle_m.z - z_m) < kLevel_m;
 }
 
-/// Whether a point, relative to the line's middle, is within the line's ends plus the side tolerance.
+/// Whether a point lies sideways between the line's ends plus the side tolerance. The point is relative to the line's
+/// middle.
 PICTURA_HD inline bool is_within_ends(const StopLine& line, Vec2 from_middle_m) {
   return fabsf(cross(line.direction, from_middle_m)) <= line.half_length_m + kStopLineSideTolerance_m;
 }

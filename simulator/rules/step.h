@@ -1,5 +1,6 @@
 // One step of one agent, in three phases: (1) advance: motion, road, lights and goals; (2) collisions with all boxes;
-// (3) reward and halt. All agents of a world finish a phase before any agent begins the next phase.
+// (3) reward and halt. All agents of a world finish phase 1 before any agent begins phase 2; phases 2 and 3 need no
+// such order.
 #pragma once
 
 #include "pictura/simulator/command.h"
@@ -263,10 +264,10 @@ PICTURA_HD inline StepFacts step_facts(const Motion& motion, const LaneFit& fit,
   return facts;
 }
 
-/// Phase 3: computes the reward of an active agent and returns its terms. After an infraction, the agent halts or
-/// leaves, as options.after_infraction says; it also leaves at its goal (options.leave_at_goal) or where its road ends.
-/// An agent that leaves becomes absent or waiting; its box remains visible until the next step, but takes no part in
-/// that step's collisions. Phase 2 of other agents reads no data that this phase writes.
+/// Phase 3: computes the reward of an active agent and returns its terms. After an infraction, the agent halts, leaves
+/// or drives on, as options.after_infraction says; it also leaves at its goal (options.leave_at_goal) or where its road
+/// ends. An agent that leaves becomes absent or waiting; its box remains visible until the next step, but takes no part
+/// in that step's collisions. Phase 2 of other agents reads no data that this phase writes.
 PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int agent) {
   if (!is_active(world, agent)) return {};
   const AgentStateView& agents = world.agents;

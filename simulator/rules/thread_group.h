@@ -16,7 +16,7 @@ struct SingleThread {
 
   PICTURA_HD static constexpr int size() { return kSize; }
   PICTURA_HD int rank() const { return 0; }
-  /// Makes earlier writes of each thread of the group visible to all of its threads.
+  /// Makes earlier writes of each thread visible to all threads of the group.
   PICTURA_HD void sync() const {}
   PICTURA_HD bool any(bool value) const { return value; }
   PICTURA_HD int sum(int value) const { return value; }

@@ -35,8 +35,8 @@ class Communicator {
   virtual void max(const at::Tensor& tensor) = 0;
   /// Copies rank `root`'s tensor to all ranks.
   virtual void broadcast(const at::Tensor& tensor, int root) = 0;
-  /// Counts a step of this rank, between calls that are far apart; see Ranks::step(). Every rank must make equally many
-  /// of these calls.
+  /// Counts a step of this rank; called where collective operations are far apart, see Ranks::step(). Every rank must
+  /// make equally many of these calls.
   virtual void step() = 0;
 
   /// Returns the maximum over ranks of a number on the host.

@@ -10,9 +10,8 @@ namespace pictura {
 /// One step of one agent.
 /// - A terminated step does not bootstrap.
 /// - A truncated step bootstraps from the value of the next row, which belongs to the final observation. The next step
-///   resets the world, so its transition is not valid. No advantage crosses the end of an episode.
-/// - An invalid step (its agent had halted, or its world was being reset) has the advantage 0. Earlier steps bootstrap
-///   from its value.
+///   is not valid: the world is reset, or the slot waits for a new agent. No advantage crosses the end of an episode.
+/// - An invalid step (such as one of a halted agent) has the advantage 0. Earlier steps bootstrap from its value.
 /// - A step without a decision continues the previous step's action. It has the advantage 0, and its reward is part of
 ///   the return of the last decision.
 struct GaeTransition {

@@ -19,8 +19,7 @@ class NearestOfOneThread {
   /// Adds the items whose squared distance from a point is less than below2, except item `except`.
   PICTURA_HD void offer_all(const Vec2* places, const int32_t* items, int num_items, int32_t except, Vec2 from,
                             float below2) {
-    // Near items are first collected, without branches, in a buffer, because it is hard to predict whether an item is
-    // near.
+    // A buffer first collects the near items, without branches, because it is hard to predict whether an item is near.
     float near_distance2[kGathered + 8];
     int32_t near_items[kGathered + 8];
     int num_near = 0;
@@ -59,7 +58,7 @@ class NearestOfOneThread {
     }
     insert_near();
   }
-  /// Finishes the selection: call after the last add() and before the functions below.
+  /// Finishes the selection: call it after the last item is added and before the functions below.
   PICTURA_HD void settle() {
     int64_t keys[Keys::kCount];
     keys_.store(keys);
