@@ -13,7 +13,7 @@ namespace pictura {
 /// too much (SceneProtocol::max_first_turn_deg). Throws Error if the scene's time step is not 0.1 s.
 std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const SceneProtocol& protocol);
 
-/// Returns for each track, [tracks], 1 if thinning removes it, else 0. Thinning removes round((1 - density) n) of the n
+/// Returns [tracks]: 1 for each track that thinning removes, else 0. Thinning removes round((1 - density) n) of the n
 /// road users other than the self-driving car. Seed and scenario id determine the random choice. Tracks removed at a
 /// density are also removed at every lower density.
 std::vector<uint8_t> select_thinned_tracks(const Scenario& scenario, double density, uint64_t seed);
@@ -25,8 +25,8 @@ struct ScenePlan {
   std::vector<int32_t> takeover_steps;  // [tracks] episode step at which a driven track appears
 };
 
-/// Returns whether the scene has a road user to drive, before thinning and regardless of overlaps. A scene has none,
-/// for instance, if all of its vehicles are parked.
+/// Returns whether the scene has a road user to drive, before thinning and even if its box overlaps another. A scene
+/// has none, for instance, if all of its vehicles are parked.
 bool has_drivers(const CompiledMap& map, const SceneProtocol& protocol);
 
 /// Plans the roles of road users in a world of `map`, which must be compiled for episodes from protocol.start_step on.

@@ -37,8 +37,8 @@ class MapImport {
 };
 
 /// Calls fill(import), and returns the validated map with its repairs. Adds the file's name, `source`, to error
-/// messages that do not begin with it. Throws Error if options.chord_error_m is outside [0.001, 10] m, or if
-/// options.plan mirrors or has a singular value outside [0.5, 1.5].
+/// messages that do not begin with it. Throws Error if options.chord_error_m is outside [0.001, 10] m, or if the linear
+/// map options.plan contains a reflection or has a singular value outside [0.5, 1.5].
 RoadMap import_map(std::size_t text_bytes, const std::string& source, const OpenDriveOptions& options,
                    const ImportProgress& progress, const std::function<void(MapImport* import)>& fill);
 

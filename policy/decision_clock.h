@@ -18,8 +18,8 @@ class DecisionClock {
   /// Returns those of the `active` slots (i64 [n], in ascending order) that decide at the next step. Call it once per
   /// step. `step` is the number of the next step, which the caller counts. episode_over: u8 [worlds], or empty. In
   /// worlds with a nonzero entry, all agents decide, so that the policy computes the value of their last observation.
-  /// Agents that have just left at the end of a road decide for the same reason. On a device, the call waits for the
-  /// number of slots, unless all agents decide.
+  /// Agents that have just left at the end of a road decide for the same reason. If the arrays are on a device, the
+  /// host waits for it to learn the number of slots, unless all agents decide.
   at::Tensor select_deciding(const SimulatorArrays& input, const at::Tensor& active, int64_t step,
                              Span<const uint8_t> episode_over = {});
 

@@ -66,7 +66,7 @@ class Muon {
   // Index of each batch element in a vector of all weights' elements (for padding, the vector's size), and the inverse
   // mapping.
   at::Tensor element_of_place_, place_of_element_;
-  std::vector<at::Tensor> scales_;  // [batches] factor of the step of each weight in the batch, [weights, 1, 1]
+  std::vector<at::Tensor> scales_;  // [batches], each [weights, 1, 1]: factors of the weights' steps
   at::Tensor rate_, failed_;        // f32 scalars of this step
   Graphs graphs_;
   RepeatedWork step_;

@@ -15,8 +15,8 @@ double learning_rate_at(const TrainSection& config, int64_t agent_steps);
 bool schedule_has_ended(const TrainSection& config, int64_t agent_steps);
 
 /// Returns the factor by which logits are multiplied after an update of this number of agent-steps. Logits double every
-/// sharpen_agent_steps, as if the softmax's temperature halved. Then agents that start moving only by chance wait even
-/// longer, so the policy must learn to start.
+/// sharpen_agent_steps, as if the softmax's temperature halved. If an agent starts moving only with a small
+/// probability, this makes it wait even longer, so the policy learns to start.
 double logit_growth(const TrainSection& config, int64_t agent_steps);
 
 /// Returns the weight of the KL divergence from the teacher's actions in an update that starts after `agent_steps`. The

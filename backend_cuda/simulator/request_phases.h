@@ -6,7 +6,7 @@
 
 namespace pictura::cuda {
 
-/// Phase that records the first element of an edit for each slot.
+/// Phase that records, for each slot, the first element of an edit that names the slot.
 struct MarkEdit {
   PhaseArrays arrays;
   StateEdit edit;

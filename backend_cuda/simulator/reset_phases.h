@@ -16,12 +16,12 @@ struct TeamMemory {
 };
 
 /// Chooses a try (a candidate place) for each of `count` boxes, which are the world's boxes from first_box on. Adds the
-/// placed boxes to the standing boxes. The chosen try is the first that the map permits and that is clear of the
-/// standing boxes and of all boxes with lower numbers. So the result equals that of placing the boxes one after the
-/// other. In a turn, kTurn boxes choose at the same time. In each round of a turn, every box that is not yet fixed
-/// chooses again, given the last choices of the other boxes, until no choice changes. Then every choice follows from
-/// those of the boxes before it, and only the sequential result has this property. Every round fixes at least the
-/// lowest changed box. Choices of an earlier turn do not change.
+/// placed boxes to scratch.standing, the boxes that already have a place ("standing boxes"). The chosen try is the
+/// first that the map permits and that is clear of the standing boxes and of all boxes with lower numbers. So the
+/// result equals that of placing the boxes one after the other. In a turn, kTurn boxes choose at the same time. In each
+/// round of a turn, every box that is not yet fixed chooses again, given the last choices of the other boxes, until no
+/// choice changes. Then every choice follows from those of the boxes before it, and only the sequential result has this
+/// property. Every round fixes at least the lowest changed box. Choices of an earlier turn do not change.
 ///   box_of_try(i, try), permits(group, i, try, box)
 template <typename Team, typename BoxOfTry, typename Permits>
 PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,
@@ -176,9 +176,9 @@ struct PlaceCenters {
   }
 };
 
-/// Phase that sorts the boxes of crowds (see is_crowd()) into cells by counting. If ends_step, it skips crowds whose
-/// boxes cannot have changed at the end of the step. The order within a cell is arbitrary, and rules do not depend on
-/// it.
+/// Phase that sorts the boxes of crowds (see is_crowd()) into cells by counting. If ends_step (the second sort of a
+/// step), it skips crowds whose world began no episode, unless the maps have lives. The order within a cell is
+/// arbitrary, and rules do not depend on it.
 struct SortBoxes {
   PhaseArrays arrays;
   bool ends_step = false;

@@ -1,4 +1,4 @@
-// Checks that every renderer makes before it draws: of the images to fill, and of scenes in host memory.
+// Checks that each renderer makes before drawing, on the images to fill and on scenes in host memory.
 #pragma once
 
 #include <string_view>

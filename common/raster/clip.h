@@ -7,7 +7,8 @@
 
 namespace pictura {
 
-/// Clipping by five planes adds at most one corner per plane; one further corner is for a cut in progress.
+/// Clipping by five planes adds at most one corner per plane. One more is needed because a step of clip_face() can
+/// write two corners.
 constexpr int kMaxPolygonCorners = kMaxFaceCorners + 6;
 
 /// One of the five planes of the frustum: the near plane and four sides. inside() is a distance from the plane,
@@ -67,9 +68,9 @@ PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_insid
 /// Maximum number of corners that widen_in_front() emits.
 constexpr int kMaxWidenedCorners = 5;
 /// Widens a strip in camera coordinates to at least floor_px on screen. If the strip crosses the near plane, it is cut
-/// there, and only its far end is widened: if whole sides moved, they would deviate from the strip near the camera.
-/// Calls emit(i, corner) for i = 0, 1, ... and returns the number of corners. For other faces, floor_px is 0 and the
-/// corners do not change.
+/// there at its original width, and only its far end is widened, so that its sides stay in place near the camera. Calls
+/// emit(i, corner) for i = 0, 1, ... and returns the number of corners. For other faces, floor_px is 0 and the corners
+/// do not change.
 template <typename Emit>
 PICTURA_HD inline int widen_in_front(const PinholeCamera& camera, float floor_px, const Vec3* corners, Emit&& emit) {
   Vec3 widened[4];

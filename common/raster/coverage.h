@@ -69,10 +69,11 @@ PICTURA_HD inline SampleRange whole_range() {
   return {make_int16x8([](int) { return -kFar_units; }), make_int16x8([](int) { return kFar_units; })};
 }
 
-/// Summand that moves a height, given as a fraction of kLines_rows, to the lowest bits of a float's mantissa.
+/// Summand that moves a height, as a fraction of kLines_rows (edges.h), to the lowest bits of a float's mantissa.
 constexpr float kToLowestBits = 1 << 8;  // the sum's lowest mantissa bit is 1 / (kLines_rows * kRowUnits)
 /// For each column, the difference between an edge's height in that column and its height in the first column right of
-/// the pixel's centre, minus 2^14. kToLowestBits puts the pixel's centre at height 2^14; the subtraction moves it to 0.
+/// the pixel's centre, minus 2^14. With kToLowestBits, the pixel's centre has height 2^14; subtracting 2^14 moves the
+/// centre to 0.
 PICTURA_HD inline Int16x8 column_heights(const PolygonEdge& edge) {
   return arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
 }

@@ -51,7 +51,7 @@ PICTURA_HD inline bool may_be_visible(const AgentBox& box, const PinholeCamera& 
   return box.drawn != 0 && sphere_in_frustum(f, to_camera(camera, box_middle(box)), box_radius_m(box));
 }
 
-/// Whether a view excludes an agent: the view's own ego or a hidden agent.
+/// Whether a view excludes an agent: the view's own ego, a hidden agent, or any agent if the view hides all.
 PICTURA_HD inline bool is_excluded(const View& view, Span<const int32_t> hidden_agents, int32_t agent) {
   if (agent == view.ego_agent || (view.hides & kHidesAgents) != 0) return true;
   for (int32_t i = view.hidden_begin; i < view.hidden_end; ++i) {

@@ -291,8 +291,8 @@ constexpr float kEqualDepth = 1e-4f;
 /// solid's base is at most this far from the strip's plane. The distance is not 0, because upright boxes cut into
 /// slopes.
 constexpr float kStanding_m = 0.5f;
-/// Maximum distance by which solids that stand on a strip extend below its plane. Only culling uses this distance: to
-/// hide a strip that is seen from below, an occluder must also be in front of these solids.
+/// Maximum distance by which solids that stand on a strip extend below its plane. Only culling uses this distance: an
+/// occluder hides a strip that is seen from below only if it is also in front of these solids.
 constexpr float kThroughStrip_m = 4.0f * kStanding_m;
 
 /// Rank of a strip: where strips on one level overlap, the strip with the lower rank is in front.

@@ -57,8 +57,8 @@ struct CornerResults : ProbeResults {
 };
 
 /// Reveal of a run: the step at which the ego's line of sight opens to the hidden vehicle, or to the place where the
-/// removed vehicle would be. In a run at an empty corner, the reveal is at the same step as in the same policy's run
-/// from the pair's state with a hidden vehicle.
+/// removed vehicle would be. In a run at an empty corner, it is the step of the reveal in the same policy's run of
+/// CornerCase::hidden.
 struct Reveal {
   int32_t step = 0;
   std::optional<float> distance_m;  // from ego to hidden vehicle, between the boxes' centres

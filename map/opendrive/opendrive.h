@@ -14,8 +14,8 @@ namespace pictura {
 struct OpenDriveOptions {
   float chord_error_m = 0.02f;  // maximum distance between a sampled curve and the exact curve
   bool strict = false;          // also refuse faults that could be repaired
-  // Linear transformation of the ground plane for an affine copy, whose lanes keep their widths. The transformation
-  // must not mirror, and must not change any length by more than half.
+  // Linear transformation of the ground plane, which makes an affine copy of the map. Lanes keep their widths. The
+  // transformation must not mirror, and must not change any length by more than half.
   PlanMap plan;
 };
 

@@ -16,17 +16,18 @@ namespace pictura {
 /// Actions of every track: one action for each step of the record.
 struct InverseActions {
   int32_t num_steps = 0;             // number of steps of the record from its start step on
-  std::vector<int32_t> actions;      // [tracks, num_steps] without jerk if there is no state to follow
+  std::vector<int32_t> actions;      // [tracks, num_steps] kIdleAction in steps that are not followed
   std::vector<uint8_t> is_followed;  // [tracks, num_steps] 1: the states before and after the step are recorded
   std::vector<float> error_m;        // [tracks, num_steps] distance from the recorded position after the step
 };
 
 /// Finds the actions by a beam search, which keeps the best kBeamWidth sequences of actions. Each run of consecutive
-/// recorded states is searched separately. A run starts from its first state with accelerations and steering angle 0,
-/// because recorded agents have these values. The cost of a sequence is the sum of squared distances from the recorded
-/// positions. It also contains a small cost for deviations of speed and heading, which prevents weaving, and a
-/// predicted cost of returning to the record from the last motion. Multipliers of the dynamics are 1; `rules` must be
-/// those of the worlds in which the actions will be used. Throws UsageError for a map without a record.
+/// recorded states is searched separately. A run starts from its first state, with accelerations and steering angle 0,
+/// as agents that follow their record have in the simulator. The cost of a sequence is the sum of squared distances
+/// from the recorded positions. Smaller costs of accelerations and of deviations in speed and heading prevent weaving.
+/// The search ranks sequences by this cost plus the predicted cost of returning to the record from the sequence's end.
+/// Multipliers of the dynamics are 1; `rules` must be those of the worlds in which the actions will be used. Throws
+/// UsageError for a map without a record.
 InverseActions find_inverse_actions(const CompiledMap& scene, float dt_s, int num_threads = 0,
                                     const DynamicsRules& rules = {});
 constexpr int kBeamWidth = 48;
