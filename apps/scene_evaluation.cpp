@@ -163,8 +163,8 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments) {
       "With --protocol simagents: file for the rollouts, in the format of the Waymo sim-agents challenge");
   command
       ->add_option("--realism", arguments->realism,
-                   "With --protocol simagents: score how realistic the rollouts are, with the weights of the challenge "
-                   "of this year; pictura score does the same for a file of rollouts")
+                   "With --protocol simagents: score how realistic the rollouts are; the value is the year of the "
+                   "challenge whose weights are used. pictura score does the same for a file of rollouts")
       ->check(one_of(realism_version_names()));
 }
 

@@ -87,7 +87,7 @@ class Function {
   }
 
   static py::dict observations_of(const ObservationView& view, int agents) {
-    // Copied, since the function may keep the arrays.
+    // Arrays are copied, because the function may keep them.
     py::dict observations;
     for (const NamedArray& named : observation_arrays(view, agents, Device{})) {
       const Array& array = named.array;
@@ -157,7 +157,7 @@ class Function {
   }
 
   std::string name_;
-  std::shared_ptr<const py::object> function_;  // shared, since copies are made without the GIL
+  std::shared_ptr<const py::object> function_;  // shared, because copies are made without the GIL
 };
 
 class FunctionController final : public PolicyController {

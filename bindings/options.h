@@ -100,8 +100,7 @@ class ParameterVisitor {
       for (const auto& one : given) {
         const auto* const path = std::get_if<std::string>(&one);
         options.policies.push_back(path ? *path : name_of_function(std::get<py::function>(one)));
-        options.make_own_policies.push_back(nullptr);
-        if (!path) options.make_own_policies.back() = function_sessions(std::get<py::function>(one));
+        options.make_own_policies.push_back(path ? nullptr : function_sessions(std::get<py::function>(one)));
       }
     });
   }

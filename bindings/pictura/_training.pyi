@@ -85,8 +85,9 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
         maps: Names, files, or ranges such as procedural:1-64.
         controller: Driver instead of the policy: 'lane', 'idm_lanes', 'random', 'idle', or a function. The function gets a
             dict of NumPy arrays [slots, ...] like pictura.Simulator.observations, and returns actions int [slots], or
-            logits [slots, 12] and values [slots], on the CPU. If cameras are given (rig, or width_px and height_px), the dict also contains images: `rgb` uint8 [slots,
-            cameras, 3, height, width], black for inactive agents, or rgb_0, rgb_1, ... for cameras of several sizes.
+            logits [slots, 12] and values [slots], on the CPU. If cameras are given (rig, or width_px and height_px), the
+            dict also contains images: `rgb` uint8 [slots, cameras, 3, height, width], black for inactive agents, or rgb_0,
+            rgb_1, ... for cameras of several sizes.
         densities: 'light', 'medium' and 'dense': 60, 120 and 150 agents per world.
         agents_per_world: Number of agents per world instead of the densities' numbers; 0: as in `densities`.
         others: Other drivers with their shares of vehicles, policy files or controllers, such as {'lane': 0.3,
