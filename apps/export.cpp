@@ -38,7 +38,7 @@ void add_export_command(CLI::App& app) {
       "  pictura export runs/town01/checkpoint.ckpt --out town01.safetensors\n"
       "  pictura export runs/town01/checkpoint.ckpt --weights f32 --out town01.safetensors\n"
       "  pictura export runs/town01/checkpoint.ckpt --average --out town01_average.safetensors\n"
-      "  pictura export models/perspective.safetensors --size 96x54 --weights f32 --out perspective_96x54.safetensors\n"
+      "  pictura export runs/demo/checkpoint.ckpt --size 96x54 --out demo_96x54.safetensors\n"
       "  pictura simulate Town01 --policy town01.safetensors --video drive.mp4");
   command->callback([arguments] {
     ExportOptions options{.commit = PICTURA_COMMIT, .average = arguments->average};
