@@ -40,8 +40,10 @@ void print_table(const SceneEvaluation& evaluation) {
   const SceneProtocol& protocol = evaluation.results.protocol;
   print_settings(protocol);
   const SceneResults& results = evaluation.results;
-  print_result("{} scenes: {} scored, {} without a road user to drive, {} faults\n\n", evaluation.found,
+  print_result("{} scenes: {} scored, {} without a road user to drive, {} faults\n", evaluation.found,
                results.scored(), results.without_drivers, evaluation.faults().size());
+  if (results.repaired_headings > 0) print_result("{} first headings repaired\n", results.repaired_headings);
+  print_result("\n");
   constexpr const char* kLine = "{:8} {:34} {:>8} {:>9} {:>17} {:>17} {:>17} {:>17} {:>17} {:>9}\n";
   print_result(fmt::runtime(kLine), "density", "agent", "scenes", "vehicles", "at-fault", "off-road", "goals",
                "collisions", "displacement m", "km");
@@ -99,6 +101,7 @@ void print_report(const DriverOptions& options, const SceneEvaluation& evaluatio
                {"scenes", evaluation.found},
                {"scored", results.scored()},
                {"without_drivers", results.without_drivers},
+               {"repaired_headings", results.repaired_headings},
                {"faults", evaluation.faults()},
                {"interrupted", evaluation.interrupted},
                {"agent_steps", results.agent_steps()},

@@ -113,6 +113,7 @@ py::dict dict_of(const SceneEvaluation& evaluation, const std::vector<SceneAgent
   d["scenes"] = evaluation.found;
   d["scored"] = evaluation.results.scored();
   d["without_drivers"] = evaluation.results.without_drivers;
+  d["repaired_headings"] = evaluation.results.repaired_headings;
   d["faults"] = evaluation.faults();
   d["seconds"] = evaluation.seconds;
   d["agent_steps"] = evaluation.results.agent_steps();
@@ -521,8 +522,8 @@ Examples:
 
 Returns a dict. `rows` has one dict for each density, with metrics as (value, half width of the 95 % interval). `agents`
 has one dict for each driven road user in each scene, density and rollout. `realism`, if requested, is the result of
-pictura.realism.score_file(). The other names are scenes, scored, without_drivers, faults (skipped scenes with reasons),
-seconds, agent_steps and policy_hash.
+pictura.realism.score_file(). The other names are scenes, scored, without_drivers, repaired_headings (by the
+rule max_first_turn_deg), faults (skipped scenes with reasons), seconds, agent_steps and policy_hash.
 
 checkpoint: file of a policy; '' with `controller`.
 scenes: files, folders, or 'FILE#K' for scene K of a file.

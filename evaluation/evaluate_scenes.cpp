@@ -509,6 +509,7 @@ SceneEvaluation evaluate_scenes(const EvaluatedDriver& driver, Renderer* rendere
     if (evaluation.interrupted) break;
     for (size_t scene = 0; scene < batch.maps.size(); ++scene) {
       count_agents(agents, scene, options, &results);
+      results.repaired_headings += batch.maps[scene]->scenario->repaired_headings;
       if (options.on_rollouts) options.on_rollouts(rollouts[scene]);
     }
     if (!options.realism.empty()) add_realism(batch, rollouts, options, &evaluation.realism);

@@ -121,6 +121,7 @@ SceneResults merge(const std::vector<SceneResults>& parts, const std::vector<std
                   all.first_scene + all.num_scenes, names[order[i - 1]]);
     all.num_scenes += part.num_scenes;
     all.without_drivers += part.without_drivers;
+    all.repaired_headings += part.repaired_headings;
     all.faults.insert(all.faults.end(), part.faults.begin(), part.faults.end());
     for (size_t d = 0; d < all.counts.size(); ++d) {
       all.counts[d].insert(all.counts[d].end(), part.counts[d].begin(), part.counts[d].end());
@@ -142,6 +143,7 @@ void write_results(const std::string& path, const SceneResults& results) {
                      {"first_scene", results.first_scene},
                      {"num_scenes", results.num_scenes},
                      {"without_drivers", results.without_drivers},
+                     {"repaired_headings", results.repaired_headings},
                      {"faults", results.faults},
                      {"counts", counts}};
   write_file(path, json_text(json, 1) + "\n");
@@ -157,6 +159,7 @@ SceneResults read_scene_results(const std::string& path) {
     json.at("first_scene").get_to(results.first_scene);
     json.at("num_scenes").get_to(results.num_scenes);
     json.at("without_drivers").get_to(results.without_drivers);
+    results.repaired_headings = json.value("repaired_headings", 0);  // absent in files of earlier versions
     json.at("faults").get_to(results.faults);
     for (const Json& density : json.at("counts")) {
       std::vector<SceneCounts>& scenes = results.counts.emplace_back();

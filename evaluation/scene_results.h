@@ -51,6 +51,7 @@ struct SceneResults {
   std::vector<std::string> unread;
   int first_scene = 0, num_scenes = 0;
   int without_drivers = 0;          // scenes left out because all of their road users are parked or absent
+  int repaired_headings = 0;        // in scored scenes, by SceneProtocol::max_first_turn_deg
   std::vector<std::string> faults;  // scenes left out because they cannot be read or simulated, with reasons
   std::vector<std::vector<SceneCounts>> counts;  // [densities][scored scenes]
 

@@ -15,7 +15,7 @@ PICTURA_FIELDS(RecordedLight, stop_a_m, stop_b_m, stop_heading_rad, lanes)
 PICTURA_FIELDS(PredictedTrack, track, difficulty)
 PICTURA_FIELDS(ConversionNote, what, count, first)
 PICTURA_FIELDS(Scenario, id, format, dt_s, num_steps, current_step, sdc_track, map, tracks, states, valid, driven,
-               objects_of_interest, tracks_to_predict, lights, light_lanes, light_states, notes)
+               objects_of_interest, tracks_to_predict, lights, light_lanes, light_states, notes, repaired_headings)
 
 /// Maximum distance of positions from a scene's origin. Recordings extend over a few hundred metres.
 constexpr float kMaxScenarioRadius_m = 1e4f;

@@ -100,6 +100,7 @@ TEST(SceneProtocols, ReplaceFirstHeadingsThatNoMotionExplains) {
     turned.states[index].heading_rad = wrap_angle(recorded_rad + turn_deg * kPi / 180);
     const auto adapted = protocol_scene(turned, protocol);
     EXPECT_EQ(adapted->states[index + 1].heading_rad, recorded_rad);
+    EXPECT_EQ(adapted->repaired_headings, adapted->states[index].heading_rad == recorded_rad);
     return wrap_angle(adapted->states[index].heading_rad - recorded_rad) * 180 / kPi;
   };
   for (const char* name : {"womd", "waymax"}) {  // from the first step on, and from a later one
