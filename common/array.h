@@ -1,6 +1,4 @@
-// Arrays at public interfaces. An Array is a pointer with element type, shape, strides and device; the caller owns the
-// memory. Array::checked() compares an argument with the expected type, shape and device. Kernels take spans instead
-// (span.h).
+// Arrays at public interfaces. Kernels take spans instead (span.h).
 #pragma once
 
 #include <array>
@@ -18,12 +16,12 @@ namespace pictura {
 
 enum class ElementType : uint8_t { u8, u16, u32, i32, i64, f16, bf16, f32, f64 };
 std::size_t bytes_of(ElementType type);
-/// Name of an element type, such as "u8" or "i32".
+/// Element type's name, such as "u8" or "i32".
 std::string_view name_of(ElementType type);
-/// Name of a device, such as "cpu" or "cuda:0".
+/// Device's name, such as "cpu" or "cuda:0".
 std::string name_of(Device device);
 
-/// Type that stores a T in an array: the underlying integer if T is an enumeration, else T without const.
+/// Type that stores a T in an array: the underlying integer of an enumeration, else T without const.
 template <typename T>
 struct Stored {
   using Type = std::remove_const_t<T>;
@@ -54,7 +52,7 @@ concept ArrayElement =
     std::same_as<StoredAs<T>, int32_t> || std::same_as<StoredAs<T>, int64_t> || std::same_as<StoredAs<T>, float> ||
     std::same_as<StoredAs<T>, double>;
 
-/// Lengths or strides of up to five dimensions.
+/// Lengths or strides of an array.
 class Dims {
  public:
   static constexpr int kMaxRank = 5;
@@ -64,9 +62,8 @@ class Dims {
   int rank() const { return rank_; }
   int64_t operator[](int dimension) const { return values_[dimension]; }
   int64_t& operator[](int dimension) { return values_[dimension]; }
-  /// Product of all lengths.
   int64_t count() const;
-  /// Strides, in elements, of a gapless array with these lengths. The last dimension varies fastest.
+  /// Strides, in elements, of a contiguous row-major array with these lengths.
   Dims contiguous_strides() const;
   bool operator==(const Dims& other) const;
   /// Text such as "[4096, 7]".
@@ -94,16 +91,15 @@ struct Array {
       : Array(const_cast<std::remove_const_t<T>*>(first), element_type<T>(), its_shape, its_device) {
     is_read_only = std::is_const_v<T>;
   }
-  /// Views a whole host container, with shape [size]. Functions that take an Array therefore accept a std::vector.
+  /// Views a whole host container, with shape [size].
   template <typename Container>
     requires ArrayElement<std::remove_cvref_t<decltype(*std::declval<Container&>().data())>>
   Array(Container&& container)  // NOLINT: converts
       : Array(container.data(), {static_cast<int64_t>(container.size())}, Device{}) {}
 
   bool is_contiguous() const { return strides == shape.contiguous_strides(); }
-  /// Returns the elements of a contiguous array as a span. Throws Error if the element type, shape or device differs,
-  /// if the array has gaps, or if T is not const but the array is read-only. The message contains `what` (such as
-  /// "step: actions"), the expected array and the actual array.
+  /// Returns the elements as a span. Throws Error if the element type, shape or device differs, or if the array has
+  /// gaps. Also throws if T is not const but the array is read-only. The message begins with `what`.
   template <typename T>
   Span<T> checked(std::string_view what, const Dims& expected_shape, Device expected_device) const {
     check(what, element_type<T>(), !std::is_const_v<T>, expected_shape, expected_device);

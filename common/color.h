@@ -1,23 +1,21 @@
-// The palette of rendered images: one base colour per kind of primitive, or per face for agents. Colours fade to black
-// with distance. Vehicles have the colours of RAP (vita-epfl/RAP, renderer.py); docs/explanation/image.md lists the
-// other colours.
+// Base colours of rendered images, which fade to black with distance. Vehicles have the colours of RAP (vita-epfl/RAP,
+// renderer.py). docs/explanation/image.md lists the other colours.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// Colour with channels in [0, 1]. Files (color_rgb in scene files, PNG) store channels from 0 to 255; rgb8() converts
-/// them.
+/// Colour with channels in [0, 1].
 struct Rgb {
   float r = 0, g = 0, b = 0;
 };
 
-/// Storage of a channel. u8: 0 to 255; f16 and f32: 0 to 1; bf16: 0 to 255, which bfloat16 represents exactly.
+/// Type of a channel. The range is 0 to 1 for f16 and f32, and 0 to 255 for u8 and bf16.
 enum class PixelFormat : uint8_t { u8, f16, f32, bf16 };
 
-/// Layout of an image. planar: [3, height, width]. interleaved: [height, width, 3]. patches: [rows of patches, columns
-/// of patches, values of a patch] (patches.h); the part of a patch beyond the image is black.
+/// Layout of an image. planar: [3, height, width]. interleaved: [height, width, 3]. patches: see patches.h; parts of
+/// patches beyond the image are black.
 enum class ChannelOrder : uint8_t { planar, interleaved, patches };
 
 PICTURA_HD constexpr Rgb rgb8(int r, int g, int b) {
@@ -28,7 +26,6 @@ PICTURA_HD constexpr Rgb operator*(Rgb c, float s) { return {c.r * s, c.g * s, c
 enum class AgentClass : uint8_t { vehicle, cyclist, pedestrian };
 constexpr int kNumAgentClasses = 3;
 
-/// Faces of a cuboid, in the order of the palette.
 enum class BoxFace : uint8_t { front, back, left, right, top };
 constexpr int kNumBoxFaces = 5;
 
@@ -36,7 +33,7 @@ constexpr int kNumBoxFaces = 5;
 constexpr float kVisibleRange_m = 120.0f;
 
 PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
-  // Conditionals instead of a table, because each thread of a kernel would first build the table in its local memory.
+  // Conditionals, because each thread of a kernel would build a table in local memory.
   auto chosen = [face](Rgb front, Rgb back, Rgb left, Rgb right, Rgb top) {
     const Rgb of_sides = face == BoxFace::left ? left : face == BoxFace::right ? right : top;
     return face == BoxFace::front ? front : face == BoxFace::back ? back : of_sides;
@@ -51,8 +48,7 @@ PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
   }
 }
 
-/// State of a traffic light. `unknown` means that a recording has no state for the light. Unknown lights, and all
-/// lights of a world without light states, are not drawn. Saved files contain the numbers of the states, which must not
+/// State of a traffic light. Lights in state `unknown` are not drawn. Files contain these numbers, which must not
 /// change.
 enum class LightState : uint8_t { off, red, yellow, green, unknown };
 constexpr int kNumLightStates = 5;

@@ -1,4 +1,4 @@
-// Memory spaces and streams, without CUDA headers.
+// Devices and streams, without CUDA headers.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -7,7 +7,7 @@ namespace pictura {
 
 enum class MemorySpace : uint8_t { host, cuda };
 
-/// A memory space: host memory or the memory of one CUDA device.
+/// Host memory, or the memory of one CUDA device.
 struct Device {
   MemorySpace space = MemorySpace::host;
   int32_t index = 0;  // CUDA's device index; 0 on the host
@@ -15,7 +15,7 @@ struct Device {
   PICTURA_HD constexpr bool is_host() const { return space == MemorySpace::host; }
 };
 
-/// A cudaStream_t, declared without CUDA headers. On the host, the handle is null and calls are synchronous.
+/// A cudaStream_t. On the host, the handle is null and calls are synchronous.
 struct Stream {
   void* handle = nullptr;
 };

@@ -1,5 +1,4 @@
-// Functions that throw errors with a formatted message. Headers whose comments merely name Error include error_types.h,
-// which needs no fmt.
+// Functions that throw errors with formatted messages. Headers without fmt include error_types.h instead.
 #pragma once
 
 #include <utility>
@@ -20,7 +19,7 @@ template <typename... Args>
   throw UsageError(fmt::format(format, std::forward<Args>(args)...));
 }
 
-/// Checks an argument of a public function: throws Error with the formatted message unless `condition` holds.
+/// Throws Error with the formatted message unless `condition` holds.
 #define PICTURA_CHECK(condition, ...)               \
   do {                                              \
     if (!(condition)) ::pictura::fail(__VA_ARGS__); \

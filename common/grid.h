@@ -1,5 +1,4 @@
-// A uniform grid over the ground plane: for each square cell, the items that touch the cell, in compressed rows (CSR).
-// The host builds the grid; host and CUDA code read it.
+// Builder of uniform grids over the ground plane (grid_view.h), on the host.
 #pragma once
 
 #include <vector>
@@ -12,11 +11,10 @@ namespace pictura {
 class Grid {
  public:
   Grid() = default;
-  /// Puts item i into every cell that boxes[i] touches. Throws Error if a box is not finite, if the area would need
-  /// more than 2^26 cells, or if all items together touch more than 2^27 cells.
+  /// Puts item i into every cell that boxes[i] touches. Throws Error if cell_m is not positive or a box is not finite.
+  /// Also throws for more than 2^26 cells or 2^27 entries of cells.
   Grid(Span<const Aabb2> boxes, float cell_m);
   GridView view() const { return {origin_m_, cell_m_, num_x_, num_y_, begin_, items_}; }
-  /// Number of boxes that the grid was built from.
   std::size_t num_boxes() const { return num_boxes_; }
 
  private:
@@ -28,7 +26,7 @@ class Grid {
   std::vector<int32_t> items_;
 };
 
-/// Number of the grid's cells that a box touches.
+/// Number of cells that a box touches.
 inline int64_t num_cells(const GridView& grid, const Aabb2& box) {
   const int64_t columns = grid.cell_x(box.high.x) - grid.cell_x(box.low.x) + 1;
   return columns * (grid.cell_y(box.high.y) - grid.cell_y(box.low.y) + 1);
@@ -42,7 +40,7 @@ void visit_cells(const GridView& grid, const Aabb2& box, Visit&& visit) {
     }
   }
 }
-/// Calls visit(item) for each item in the cells that a box touches, once per such cell.
+/// Calls visit(item) for each item of each cell that a box touches.
 template <typename Visit>
 void visit_items(const GridView& grid, const Aabb2& box, Visit&& visit) {
   visit_cells(grid, box, [&](std::size_t cell) {

@@ -1,5 +1,5 @@
-// Non-owning view of a uniform grid over the ground plane, for host and CUDA code. The grid lists, for each square
-// cell, the items that touch the cell. Grid (grid.h) owns the memory and builds the lists on the host.
+// Uniform grid over the ground plane, for host and CUDA code. It lists, for each square cell, the items that touch the
+// cell. Grid (grid.h) owns the memory.
 #pragma once
 
 #include "pictura/common/math.h"
@@ -11,8 +11,7 @@ struct Aabb2 {
   Vec2 low, high;
 };
 
-/// With c = iy * num_x + ix, the items of cell (ix, iy) are items[begin[c]] to items[begin[c + 1] - 1], in ascending
-/// order.
+/// The items of cell (ix, iy) are items[begin[c]] to items[begin[c + 1] - 1], ascending, where c = iy * num_x + ix.
 struct GridView {
   Vec2 origin_m;
   float cell_m = 1;

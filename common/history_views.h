@@ -1,5 +1,4 @@
-// Mapping from the index (row) of a stored view of a SceneHistory to a view of the history's scene. Shared by host and
-// CUDA code.
+// Stored views of a SceneHistory, for host and CUDA code. at() shifts a view's indices to those of the history's scene.
 #pragma once
 
 #include "pictura/common/scene_types.h"
@@ -7,7 +6,7 @@
 namespace pictura {
 
 struct HistoryViews {
-  const View* views = nullptr;  // [steps, views_per_step], as passed to put()
+  const View* views = nullptr;  // [num_steps, views_per_step], as passed to put()
   int64_t views_per_step = 0;
   int32_t num_steps = 0, worlds_per_step = 0, agents_per_step = 0;
 
@@ -16,8 +15,7 @@ struct HistoryViews {
     nowhere.world = -1;
     if (row < 0 || row >= num_steps * views_per_step) return nowhere;
     View view = views[row];
-    // Indices are checked before they are shifted, because a shifted index beyond its own step could refer to another
-    // step.
+    // Indices are checked before the shift, because a shifted index could refer to another step.
     if (view.world < 0 || view.world >= worlds_per_step || view.ego_agent >= agents_per_step) return nowhere;
     const auto step = static_cast<int32_t>(row / views_per_step);
     view.world += step * worlds_per_step;

@@ -1,6 +1,5 @@
-// Small vectors, and transcendental functions that are bitwise equal on host and CUDA devices. The results of libm and
-// CUDA differ in their last bits. So this header implements sin, cos, atan and exp: single-precision polynomials after
-// S. Moshier's Cephes, which use only +, -, * and /.
+// Small vectors, and transcendental functions that are bitwise equal on host and CUDA devices. The functions are
+// single-precision polynomials after S. Moshier's Cephes.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -42,7 +41,7 @@ PICTURA_HD constexpr Vec3 cross(Vec3 a, Vec3 b) {
 }
 PICTURA_HD inline float length(Vec3 a) { return sqrtf(dot(a, a)); }
 
-/// False if the value is infinite, NaN or above 3.4e38 in magnitude.
+/// Whether the value is at most 3.4e38 in magnitude, and not NaN.
 PICTURA_HD inline bool is_finite(float value) { return fabsf(value) <= 3.4e38f; }
 PICTURA_HD inline bool is_finite(Vec2 v) { return is_finite(v.x) && is_finite(v.y); }
 PICTURA_HD inline bool is_finite(Vec3 v) { return is_finite(v.xy()) && is_finite(v.z); }
@@ -59,10 +58,10 @@ struct SinCos {
   float sin, cos;
 };
 
-/// Sine and cosine of an angle, with an error below 2e-7 for |x_rad| <= 1e4.
+/// Sine and cosine, with an error below 2e-7 for |x_rad| <= 1e4.
 PICTURA_HD inline SinCos sincos_of(float x_rad) {
   const float quarter_turns = floorf(x_rad * 0.63661977236758134f + 0.5f);
-  // pi/2 is split into three parts, so that the products with a small integer are exact (Cody and Waite).
+  // pi/2 is split into three parts, so that products with a small integer are exact (Cody and Waite).
   float r = x_rad - quarter_turns * 1.5703125f;
   r = r - quarter_turns * 4.837512969970703125e-4f;
   r = r - quarter_turns * 7.54978995489188216e-8f;
@@ -85,7 +84,7 @@ PICTURA_HD inline float tan_of(float x_rad) {
   return sc.sin / sc.cos;
 }
 
-/// Arc tangent, in (-pi/2, pi/2), with an error below 2e-7.
+/// Arc tangent in (-pi/2, pi/2), with an error below 2e-7.
 PICTURA_HD inline float atan_of(float x) {
   const float magnitude = fabsf(x);
   float offset = 0.0f;
@@ -104,7 +103,7 @@ PICTURA_HD inline float atan_of(float x) {
   return x < 0.0f ? -y : y;
 }
 
-/// Angle of the vector (x, y) in [-pi, pi]; 0 for the null vector.
+/// Angle of the vector (x, y), in [-pi, pi]; 0 for the null vector.
 PICTURA_HD inline float atan2_of(float y, float x) {
   if (x == 0.0f) return y > 0.0f ? kHalfPi : (y < 0.0f ? -kHalfPi : 0.0f);
   const float angle = atan_of(y / x);
@@ -112,8 +111,7 @@ PICTURA_HD inline float atan2_of(float y, float x) {
   return y < 0.0f ? angle - kPi : angle + kPi;
 }
 
-/// e^x, with a relative error below 2e-7. If x is below -87, the result is 0; if x is above 88, x is clamped to 88. NaN
-/// gives NaN.
+/// e^x, with a relative error below 2e-7. Below x = -87, the result is 0. x is clamped to 88. NaN gives NaN.
 PICTURA_HD inline float exp_of(float x) {
   if (!(x >= -87.0f)) return x < -87.0f ? 0.0f : x;
   x = min_of(x, 88.0f);
@@ -125,7 +123,7 @@ PICTURA_HD inline float exp_of(float x) {
                       r +
                   5.0000001201e-1f;
   float y = p * r * r + r + 1.0f;
-  // 2^n by repeated squaring: every factor is a power of two, so nothing is rounded.
+  // 2^n by repeated squaring, which is exact.
   int k = static_cast<int>(n);
   const float base = k < 0 ? 0.5f : 2.0f;
   k = k < 0 ? -k : k;

@@ -1,4 +1,4 @@
-// Parsing and formatting of PixelSamples, the number of samples per pixel.
+// Parser and formatter of PixelSamples.
 #pragma once
 
 #include <optional>
@@ -9,13 +9,13 @@
 
 namespace pictura {
 
-/// The accepted input of parse_pixel_samples, for messages.
+/// Accepted texts, for messages.
 constexpr const char* kPixelSamplesExpected = "1 to 64 samples like 4, or a square grid of them like 4x4";
 
-/// Parses "4" (MSAA) or "4x4" (supersampling), both up to 64 samples; returns nothing for any other text.
+/// Parses "4" (MSAA) or "4x4" (supersampling), up to 64 samples. Returns nothing for other texts.
 std::optional<PixelSamples> parse_pixel_samples(std::string_view text);
 
-/// Returns the text that parse_pixel_samples() parses to these samples.
+/// Inverse of parse_pixel_samples().
 std::string text_of(const PixelSamples& samples);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Counter-based random numbers: Philox4x32-10 (Salmon et al., SC 2011). A draw is a pure function of its key, so
-// results depend neither on the number of threads nor on how a batch is split over devices.
+// Counter-based random numbers: Philox4x32-10 (Salmon et al., SC 2011). A draw is a pure function of its key, whatever
+// the threads or devices.
 #pragma once
 
 #include "pictura/common/math.h"
@@ -12,7 +12,7 @@ struct Philox4 {
   uint32_t word[4];
 };
 
-/// Philox4x32 with ten rounds: the 128-bit block of a counter under a 64-bit key.
+/// Philox4x32 with ten rounds: the block of a counter under a 64-bit key.
 PICTURA_HD inline Philox4 philox4x32_10(Philox4 counter, uint32_t key0, uint32_t key1) {
   for (int round = 0; round < 10; ++round) {
     const uint64_t product0 = uint64_t{0xD2511F53u} * counter.word[0];
@@ -25,8 +25,7 @@ PICTURA_HD inline Philox4 philox4x32_10(Philox4 counter, uint32_t key0, uint32_t
   return counter;
 }
 
-/// Purpose of a random number. Two purposes never share a draw. Runs are reproduced from their seeds, so the number of
-/// a purpose must not change: new purposes are appended.
+/// Purpose of a draw. Runs are reproduced from their seeds, so numbers of purposes must not change.
 enum class Purpose : uint8_t {
   world_size = 0,
   spawn = 2,
@@ -56,15 +55,14 @@ enum class Purpose : uint8_t {
   impaired_spell,
 };
 
-/// Key of a stream of draws: owner, time and purpose. Ids of worlds are unique across the ranks (processes) of a run.
-/// Members that the caller does not set are 0.
+/// Key of a stream of draws. Unused members are 0.
 struct RandomKey {
-  static constexpr int kAgentBits = 12, kPurposeBits = 8;  // the other fields use all of their bits
+  static constexpr int kAgentBits = 12, kPurposeBits = 8;  // other fields use all of their bits
   static constexpr uint32_t kMaxAgents = 1u << kAgentBits;
 
   uint64_t seed = 0;
   uint32_t world = 0;
-  uint32_t agent = 0;  // index in the world, below kMaxAgents; not a simulator's slot
+  uint32_t agent = 0;  // index in the world; not a simulator's slot
   uint32_t episode = 0;
   uint32_t step = 0;
   Purpose purpose = Purpose::world_size;
@@ -72,8 +70,7 @@ struct RandomKey {
   PICTURA_HD constexpr bool is_in_range() const { return agent < kMaxAgents; }
 };
 
-/// Stream of draws of one key. A key out of range would share the draws of another key, so a debug build terminates the
-/// program.
+/// Stream of draws of one key. A debug build checks that the key is in range.
 class RandomStream {
  public:
   PICTURA_HD explicit RandomStream(const RandomKey& key)
@@ -86,7 +83,7 @@ class RandomStream {
     PICTURA_DEBUG_CHECK(key.is_in_range());
   }
 
-  /// Returns 32 uniform bits. A stream holds 16,384 draws of 32 bits.
+  /// Returns 32 uniform bits. A stream has 16,384 such draws.
   PICTURA_HD uint32_t bits() {
     if (next_ == 4) {
       block_ = philox4x32_10(counter_, key0_, key1_);
@@ -107,7 +104,7 @@ class RandomStream {
   PICTURA_HD float uniform() { return static_cast<float>(bits() >> 8) * 0x1p-24f; }
   /// Uniform in [low, high).
   PICTURA_HD float uniform(float low, float high) { return low + (high - low) * uniform(); }
-  /// Uniform in {0, ..., n - 1}, n >= 1 (multiply-shift; bias below n / 2^32).
+  /// Uniform in {0, ..., n - 1}, n >= 1, with a bias below n / 2^32.
   PICTURA_HD int below(int n) { return static_cast<int>((uint64_t{bits()} * static_cast<uint32_t>(n)) >> 32); }
 
  private:

@@ -1,6 +1,5 @@
-// The scene: all data that a simulator and a renderer exchange. StaticGeometry is the drawn part of a map, which is
-// uploaded once. SceneBatch holds everything that moves or changes, and is written in every step. A View is the pose of
-// a camera rig. The plain data types are in scene_types.h.
+// The scene: all data that a simulator and a renderer exchange. StaticGeometry is uploaded once. SceneBatch is written
+// in every step.
 #pragma once
 
 #include <vector>
@@ -10,7 +9,7 @@
 
 namespace pictura {
 
-/// The drawn part of a map; shared by all worlds on the map.
+/// The drawn part of a map, shared by all worlds on the map.
 struct StaticGeometry {
   std::vector<Strip> strips;
   std::vector<WallFace> walls;
@@ -18,7 +17,7 @@ struct StaticGeometry {
   Grid strip_grid, wall_grid;
   int32_t num_signals = 0;
 
-  /// Fills both grids from strips and walls; call after the vectors are complete.
+  /// Fills both grids from the strips and walls.
   void build_grids();
   StaticGeometryView view() const { return {strips, walls, heads, strip_grid.view(), wall_grid.view(), num_signals}; }
 };
@@ -35,7 +34,7 @@ struct SceneOwner {
   SceneBatch batch() const {
     return {Device{}, world_begin, agents, geometry, light_begin, light_states, hidden_agents};
   }
-  /// Ends a world: agents and lights added since the last call belong to it.
+  /// Ends a world, to which all new agents and lights belong.
   void end_world(GeometryHandle handle) {
     world_begin.push_back(static_cast<int32_t>(agents.size()));
     light_begin.push_back(static_cast<int32_t>(light_states.size()));
@@ -43,15 +42,14 @@ struct SceneOwner {
   }
 };
 
-/// Makes a box that is drawn in the colours of its class. size_m is (length, width, height).
+/// Makes a box in the colours of its class. size_m is (length, width, height).
 AgentBox make_box(AgentClass agent_class, Vec3 center_m, float heading_rad, Vec3 size_m);
 
-/// Makes a view at a pose. The view hides no agent.
+/// Makes a view that hides no agent.
 View make_view(Vec3 origin_m, float heading_rad);
 
-/// Views of one call to a renderer. If num_views is not null, it points to memory on the device of the views, and only
-/// views [0, *num_views) are read. So a list of views that a kernel has compacted can be drawn without copying its
-/// length to the host.
+/// Views of one call to a renderer. If num_views is not null, only the first *num_views views are read. num_views
+/// points to memory on the device of the views, so that kernels can write it.
 struct ViewBatch {
   Span<const View> views;
   const int32_t* num_views = nullptr;
@@ -63,9 +61,9 @@ struct ViewBatch {
   std::size_t size() const { return views.size(); }
 };
 
-/// Minimum distance on the ground plane between consecutive points of a polyline; closer points are dropped.
+/// Minimum distance, on the ground plane, of consecutive points. Closer points are dropped.
 constexpr float kRepeatedPoint_m = 1e-4f;
-/// Cuts a polyline of at least two points into mitred strips of at most kMaxPiece_m, and appends the strips.
+/// Cuts a polyline of at least two points into mitred strips of at most kMaxPiece_m.
 void append_strips(Span<const Vec3> points_m, float width_m, Rgb color, StripKind kind, std::vector<Strip>* strips_out);
 
 }  // namespace pictura

@@ -1,6 +1,4 @@
-// A scene in one TOML file: boxes, lines, walls, lights, a rig and views. docs/reference/scene_file.md documents every
-// key. `pictura render` and the tests of golden images draw scene files. A report of a wrong image should contain a
-// scene file.
+// Scenes in TOML files (docs/reference/scene_file.md), for `pictura render`, tests and reports of wrong images.
 #pragma once
 
 #include <string>
@@ -11,17 +9,17 @@
 
 namespace pictura {
 
-/// Input of a renderer for a scene of one world on one map.
+/// A scene of one world, with a renderer's other inputs.
 struct SceneFile {
   RendererConfig config;  // rig, line floor and palette
   StaticGeometry geometry;
-  SceneOwner scene;  // its world's geometry handle is 0
+  SceneOwner scene;  // geometry handle 0
   std::vector<View> views;
-  std::vector<std::string> view_names, view_captions;  // [views]; each name is a valid file name
+  std::vector<std::string> view_names, view_captions;  // [views]; names are valid file names
 };
 
-/// Parses a scene's text. Paths of rig files are relative to `folder`. Throws Error for unknown and missing keys, wrong
-/// types, numbers out of range and indices of agents that do not exist. The message names source, line, table and key.
+/// Parses a scene's text. Paths of rig files are relative to `folder`. Throws Error, naming source, line, table and
+/// key, for any invalid key or value.
 SceneFile parse_scene(const std::string& text, const std::string& source, const std::string& folder = ".");
 
 /// Reads a scene file of up to 1 MiB.

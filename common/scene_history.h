@@ -1,5 +1,4 @@
-// Storage of the scenes of many steps as one large scene. One call of a renderer can redraw the images of any agents at
-// any of these steps. So training minibatches, films and replays need no stored images.
+// Storage of the scenes of many steps as one large scene, from which images of any step can be drawn again.
 #pragma once
 
 #include <memory>
@@ -11,18 +10,18 @@
 
 namespace pictura {
 
-/// Capacity of a history. Every step has the same numbers of worlds, agents, lights and views.
+/// Capacity of a history. All steps have the same sizes.
 struct SceneHistorySize {
   int num_steps = 0;
   std::size_t worlds = 0, agents = 0, lights = 0, views = 0;  // per step
 };
 
-/// History of scenes in the memory of one device. World w of step s is world s * worlds + w of the history; agents and
-/// lights are numbered in the same way. Devices, streams and waiting follow the rules of Renderer (renderer.h): put()
-/// and gather() neither allocate nor wait.
+/// History of scenes in the memory of one device. World w of step s is world s * worlds + w of the history. Agents and
+/// lights are numbered likewise. put() and gather() neither allocate nor wait. The rules of Renderer (renderer.h) for
+/// devices and streams apply.
 class SceneHistory {
  public:
-  /// Throws Error if the history has more agents or lights than a scene can have.
+  /// Throws Error without steps, or for more worlds, agents or lights than int32_t can count.
   explicit SceneHistory(const SceneHistorySize& size);
   virtual ~SceneHistory() = default;
   SceneHistory(const SceneHistory&) = delete;
@@ -31,23 +30,20 @@ class SceneHistory {
   virtual Device device() const = 0;
   const SceneHistorySize& size() const { return size_; }
 
-  /// Stores a scene and the views of its agents at `step`, replacing the step's previous content. Steps must be filled
-  /// for the first time in ascending order. Throws Error if the scene is on another device, has other sizes or has
-  /// hidden agents, or if an earlier step was never filled.
+  /// Stores a scene and views of its agents, replacing the step's content. Throws Error if the scene is on another
+  /// device, has other sizes or has hidden agents, or if an earlier step is missing.
   void put(int step, const SceneBatch& scene, Span<const View> views, Stream stream = {});
 
-  /// Returns the scene of all steps that have been put.
+  /// Returns the scene of all stored steps.
   virtual SceneBatch scene() const = 0;
 
-  /// Copies stored views, with their indices shifted to those of scene(). Row step * size().views + view selects one
-  /// view of one step. If that step has not been put, or if the view's world or ego was out of range in its step, the
-  /// copy is a view that renderers refuse. Throws Error unless there are as many rows as views_out.
+  /// Copies stored views, with indices into scene(). Row step * size().views + view selects a view of a step. Renderers
+  /// refuse copies of missing or invalid views. Throws Error unless rows and views_out have equal lengths.
   void gather(Span<const int64_t> rows, Span<View> views_out, Stream stream = {}) const;
 
  protected:
-  /// Number of steps that have been put.
   int num_steps() const { return num_steps_; }
-  /// Returns gather()'s mapping from rows to views. `views` holds the stored views, [steps, views per step].
+  /// Returns gather()'s mapping. `views`: [steps, views per step].
   HistoryViews history_views(const View* views) const {
     return {views, static_cast<int64_t>(size_.views), num_steps_, static_cast<int32_t>(size_.worlds),
             static_cast<int32_t>(size_.agents)};
@@ -61,7 +57,7 @@ class SceneHistory {
   int num_steps_ = 0;
 };
 
-/// Memory of a history on host or device. Buffer<T>(n) is a buffer of n elements that begins at data().
+/// Memory of a history. Buffer<T>(n) is a buffer of n elements that begins at data().
 template <template <typename...> class Buffer>
 struct SceneHistoryArrays {
   SceneHistorySize size;
@@ -80,7 +76,6 @@ struct SceneHistoryArrays {
         light_begin(count(s.num_steps, s.worlds) + 1),
         views(count(s.num_steps, s.views)) {}
 
-  /// Returns the scene of the first num_steps steps.
   SceneBatch scene(Device device, int num_steps) const {
     const std::size_t worlds = count(num_steps, size.worlds);
     return {device,
@@ -92,8 +87,7 @@ struct SceneHistoryArrays {
             {}};
   }
 
-  /// Writes a step. copy(from, to) copies the elements of `from` to the address `to`; shift(from, added, to) also adds
-  /// `added` to each element.
+  /// Writes a step. copy(from, to) copies elements. shift(from, added, to) also adds `added` to each element.
   template <typename Copy, typename Shift>
   void write_step(int step, const SceneBatch& scene, Span<const View> step_views, Copy&& copy, Shift&& shift) {
     const std::size_t worlds = count(step, size.worlds);
@@ -109,10 +103,8 @@ struct SceneHistoryArrays {
   static std::size_t count(int steps, std::size_t of_step) { return static_cast<std::size_t>(steps) * of_step; }
 };
 
-/// Makes a history in host memory.
 std::unique_ptr<SceneHistory> make_host_scene_history(const SceneHistorySize& size);
 
-/// Size of a history in bytes.
 int64_t bytes_of(const SceneHistorySize& size);
 
 }  // namespace pictura

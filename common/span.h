@@ -1,5 +1,4 @@
-// Non-owning pointer and length, for host and CUDA code. A std::vector converts to a Span, and a Span<T> converts to a
-// Span<const T>. Lengths and indices may have any integer type, so that code that counts in int needs no casts.
+// Non-owning pointer and length, for host and CUDA code. Lengths and indices may have any integer type.
 #pragma once
 
 #include "pictura/common/portable/hd.h"

@@ -9,11 +9,11 @@ namespace pictura {
 
 inline void check_cuda(cudaError_t status, const char* what) {
   if (status == cudaSuccess) return;
-  cudaGetLastError();  // clears the error, so that a later call does not report it again
+  cudaGetLastError();  // clears the error, so that no later call reports it
   fail("cuda: {}: {}", what, cudaGetErrorString(status));
 }
 
 }  // namespace pictura
 
-/// Throws Error naming the CUDA call if the call fails.
+/// Throws Error naming the CUDA call if it fails.
 #define PICTURA_CUDA(call) ::pictura::check_cuda((call), #call)

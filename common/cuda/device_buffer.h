@@ -1,4 +1,4 @@
-// Owners of device memory, and of host memory that the device can write.
+// Owners of device memory, and of host memory that kernels can write.
 #pragma once
 
 #include <atomic>
@@ -14,11 +14,10 @@
 
 namespace pictura {
 
-/// Number of device arrays that this process has allocated so far. Tests compare it before and after a loop that must
-/// not allocate.
+/// Number of allocations of device arrays by this process, for tests.
 inline std::atomic<int64_t> device_allocations{0};
 
-/// An array in device memory, initially undefined. Movable, not copyable.
+/// An array in device memory, initially undefined.
 template <typename T>
 class DeviceBuffer {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -30,7 +29,7 @@ class DeviceBuffer {
     PICTURA_CUDA(cudaMalloc(reinterpret_cast<void**>(&data_), size * sizeof(T)));
     ++device_allocations;
   }
-  /// Copies host memory; returns when the copy is complete.
+  /// Copies host memory, and waits for the copy.
   explicit DeviceBuffer(Span<const T> host) : DeviceBuffer(host.size()) {
     if (size_ > 0) PICTURA_CUDA(cudaMemcpy(data_, host.data(), size_ * sizeof(T), cudaMemcpyHostToDevice));
   }
@@ -48,15 +47,14 @@ class DeviceBuffer {
   T* data() const { return data_; }
   std::size_t size() const { return size_; }
   Span<const T> span() const { return {data_, size_}; }
-  /// Copies size() elements from the host; returns when the host memory may be overwritten.
+  /// Copies size() elements. The host memory may then be overwritten.
   void copy_from_host(const T* host) {
     if (size_ > 0) PICTURA_CUDA(cudaMemcpy(data_, host, size_ * sizeof(T), cudaMemcpyHostToDevice));
   }
-  /// Sets every byte to the given value.
   void fill(int byte) {
     if (size_ > 0) PICTURA_CUDA(cudaMemset(data_, byte, size_ * sizeof(T)));
   }
-  /// Waits for the device's work, then copies to the host.
+  /// Waits for the device's work, then copies.
   void copy_to_host(T* host) const {
     if (size_ > 0) PICTURA_CUDA(cudaMemcpy(host, data_, size_ * sizeof(T), cudaMemcpyDeviceToHost));
   }
@@ -66,7 +64,7 @@ class DeviceBuffer {
   std::size_t size_ = 0;
 };
 
-/// A value in host memory that kernels can write and the host can read without a copy.
+/// A value in host memory that kernels can write.
 template <typename T>
 class MappedValue {
  public:

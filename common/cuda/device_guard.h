@@ -1,5 +1,4 @@
-// The current CUDA device of a thread. Objects with memory on one device set the current device in each call, so that
-// callers need not.
+// The current CUDA device of a thread.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -10,16 +9,16 @@
 
 namespace pictura {
 
-/// Makes a device the calling thread's current device, and restores the previous device at the end of the scope.
+/// Makes a device the thread's current device until the end of the scope.
 class DeviceGuard {
  public:
-  /// Throws Error naming the device if it is not a CUDA device or does not exist.
+  /// Throws Error unless the device is an existing CUDA device.
   explicit DeviceGuard(Device device) : index_(device.index) {
     PICTURA_CHECK(!device.is_host(), "cuda: expected a CUDA device, got {}", name_of(device));
     PICTURA_CUDA(cudaGetDevice(&previous_));
     if (index_ == previous_) return;
     if (const cudaError_t status = cudaSetDevice(index_); status != cudaSuccess) {
-      cudaGetLastError();  // clears the error for the next check
+      cudaGetLastError();  // clears the error
       fail("{}: {}", name_of(device), cudaGetErrorString(status));
     }
   }
@@ -33,7 +32,6 @@ class DeviceGuard {
   int index_ = 0, previous_ = 0;
 };
 
-/// Returns the calling thread's current device.
 inline Device current_device() {
   Device device{MemorySpace::cuda, 0};
   PICTURA_CUDA(cudaGetDevice(&device.index));

@@ -1,4 +1,4 @@
-// Device copies of host scenes, and images in device memory. Their memory is reused between calls.
+// Device copies of host scenes, and images in device memory.
 #pragma once
 
 #include <vector>
@@ -10,11 +10,11 @@
 
 namespace pictura {
 
-/// Device memory that grows to the largest copied array and never shrinks.
+/// Device memory that grows to the largest array so far and never shrinks.
 template <typename T>
 class DeviceUpload {
  public:
-  /// Copies from the host on the stream. Pageable host memory may be overwritten after the call returns.
+  /// Copies from the host on the stream. Pageable host memory may be overwritten afterwards.
   Span<const T> assign(Span<const T> host, cudaStream_t stream) {
     if (buffer_.size() < host.size()) buffer_ = DeviceBuffer<T>(host.size());
     if (!host.empty()) {
@@ -23,7 +23,7 @@ class DeviceUpload {
     }
     return {buffer_.data(), host.size()};
   }
-  /// Resizes to this many elements, with undefined contents.
+  /// Resizes the array, whose contents become undefined.
   Span<T> resize(std::size_t size) {
     if (buffer_.size() < size) buffer_ = DeviceBuffer<T>(size);
     return {buffer_.data(), size};
@@ -57,11 +57,10 @@ class DeviceScene {
   DeviceUpload<LightState> light_states_;
 };
 
-/// Device memory for images that are then copied to the host. image_layout() defines the layout of the colour. The
-/// optional planes (depth, class, instance) are those that the host images have.
+/// Device memory for images that are then copied to the host.
 class DeviceImages {
  public:
-  /// Allocates, on the current device, images of the same sizes, format and planes as `host`.
+  /// Allocates images of the same sizes, format and planes as `host`, on the current device.
   ImageBatch like(const ImageBatch& host) {
     std::vector<ImageSize> sizes;
     for (const CameraImages& camera : host.cameras) sizes.push_back({camera.width_px, camera.height_px});
@@ -83,10 +82,10 @@ class DeviceImages {
     return {current_device(), host.format, host.num_views, cameras_, host.order, host.patch_px};
   }
 
-  /// All colour bytes of the images that like() allocated.
+  /// All colour that like() allocated.
   Span<uint8_t> color_bytes() const { return color_bytes_; }
 
-  /// On the stream, copies the images from like() into host images, which may have fewer views.
+  /// Copies the images to host images, which may have fewer views, on the stream.
   void copy_to_host(const ImageBatch& host, cudaStream_t stream = nullptr) const {
     const auto views = static_cast<std::size_t>(host.num_views);
     auto copy = [&](void* to, const void* from, std::size_t bytes) {
@@ -97,7 +96,7 @@ class DeviceImages {
       const std::size_t value_bytes = bytes_per_value(host.format), pixels = pixels_of(k, host.num_views);
       const std::size_t image_bytes = static_cast<std::size_t>(layout_.cameras[k].camera_stride) * value_bytes;
       auto pitch = [&](int64_t view_stride) {
-        // A single image may have any stride; CUDA rejects a pitch below the row size.
+        // A single image may have any stride, but CUDA rejects a pitch below the row size.
         return views > 1 ? static_cast<std::size_t>(view_stride) * value_bytes : image_bytes;
       };
       if (views > 0 && image_bytes > 0) {

@@ -1,5 +1,4 @@
-// Conversion between streams and their numbers in DLPack (a standard for exchanging tensors), and dependencies between
-// streams.
+// Dependencies between streams, and their numbers in DLPack (a standard for exchanging tensors).
 #pragma once
 
 #include <cstdint>
@@ -8,20 +7,18 @@
 
 namespace pictura {
 
-/// Returns the stream of a DLPack number: 1 is the legacy default stream, 2 is the per-thread default stream, and any
-/// other number is a handle.
+/// DLPack numbers are 1 (legacy default stream), 2 (per-thread default stream), and handles.
 inline Stream stream_of_number(int64_t number) {
   if (number == 1) return {cudaStreamLegacy};
   if (number == 2) return {cudaStreamPerThread};
   return {reinterpret_cast<void*>(static_cast<intptr_t>(number))};
 }
-/// Returns the DLPack number of a stream. The null handle is the legacy default stream.
 inline int64_t number_of_stream(Stream stream) {
   const auto number = static_cast<int64_t>(reinterpret_cast<intptr_t>(stream.handle));
   return number == 0 ? 1 : number;
 }
 
-/// Makes later work on `after` wait for the work that is already on `before`. The call itself does not wait.
+/// Makes later work on `after` wait for the earlier work on `before`. The call itself does not wait.
 inline void order_streams(Device device, Stream before, Stream after) {
   if (number_of_stream(before) == number_of_stream(after)) return;
   const DeviceGuard guard(device);
@@ -30,7 +27,7 @@ inline void order_streams(Device device, Stream before, Stream after) {
   const cudaError_t recorded = cudaEventRecord(event, static_cast<cudaStream_t>(before.handle));
   const cudaError_t waits =
       recorded == cudaSuccess ? cudaStreamWaitEvent(static_cast<cudaStream_t>(after.handle), event, 0) : recorded;
-  cudaEventDestroy(event);  // CUDA destroys the event only after it has completed
+  cudaEventDestroy(event);  // takes effect after the event has completed
   PICTURA_CUDA(waits);
 }
 

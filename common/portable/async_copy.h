@@ -1,13 +1,11 @@
-// Asynchronous copies to shared memory, prefetches, and overlapping launches. On the host, copies are immediate and
-// waits do nothing.
+// Asynchronous copies to shared memory, prefetches, and overlapping launches. The host copies immediately.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// Copies 8 bytes, aligned to 8, into a block's shared memory. On a device the copy is asynchronous: it is valid after
-/// the same thread has called wait_for_copies().
+/// Copies 8 aligned bytes into a block's shared memory. They are valid after the same thread calls wait_for_copies().
 PICTURA_HD inline void copy_into_shared(void* to, const void* from) {
 #if defined(__CUDA_ARCH__)
   asm volatile("cp.async.ca.shared.global [%0], [%1], 8;"
@@ -24,21 +22,19 @@ PICTURA_HD inline void wait_for_copies() {
 #endif
 }
 
-/// Prefetches the memory at `first` + offset_bytes into the L2 cache of a CUDA device or the L1 cache of a host core.
-/// The address need not be allocated.
+/// Prefetches into the L2 cache of a CUDA device or the L1 cache of a host core. The address need not be allocated.
 PICTURA_HD inline void prefetch(const void* first, int offset_bytes = 0) {
-  // Added as integers, because a pointer sum must stay within an array.
+  // Integers, because a pointer sum must stay within an array.
   const uintptr_t address = reinterpret_cast<uintptr_t>(first) + static_cast<uintptr_t>(offset_bytes);
 #if defined(__CUDA_ARCH__)
   asm volatile("prefetch.global.L2 [%0];" : : "l"(address));
 #else
   __builtin_prefetch(reinterpret_cast<const void*>(address));
-  asm volatile("");  // otherwise g++ drops calls of a function that only prefetches, as if it had no effect
+  asm volatile("");  // otherwise g++ drops calls of functions that only prefetch
 #endif
 }
 
-/// Waits until the previous launch on the stream has ended and its writes are visible. With programmatic dependent
-/// launch, a kernel may start before the previous launch has ended.
+/// Waits for the previous launch on the stream and its writes, as programmatic dependent launch requires.
 PICTURA_HD inline void wait_for_earlier_launch() {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
   asm volatile("griddepcontrol.wait;" : : : "memory");

@@ -1,4 +1,4 @@
-// The processor's CRC-32C instruction, if the compiler may use it (SSE 4.2, which x86-64-v3 includes).
+// The processor's CRC-32C instruction (SSE 4.2), if available.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -11,7 +11,7 @@ namespace pictura {
 
 #ifdef __SSE4_2__
 constexpr bool kHasCrc32cInstruction = true;
-/// Returns the running sum after eight more bytes, in little-endian order.
+/// Extends a running checksum by eight bytes, in little-endian order.
 inline uint32_t crc32c_of_word(uint32_t crc, uint64_t word) { return static_cast<uint32_t>(_mm_crc32_u64(crc, word)); }
 #else
 constexpr bool kHasCrc32cInstruction = false;

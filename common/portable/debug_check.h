@@ -1,5 +1,4 @@
-// PICTURA_DEBUG_CHECK(condition) terminates a program of a debug build if an internal invariant fails, on the host and
-// in kernels. Other builds do not evaluate the condition.
+// PICTURA_DEBUG_CHECK(condition) terminates a debug build if an invariant fails, also in kernels.
 #pragma once
 
 #if defined(NDEBUG) || defined(__CUDACC_RTC__)

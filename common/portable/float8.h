@@ -1,5 +1,4 @@
-// SIMD on eight floats: one instruction per operation on a host with AVX2, eight on another host or a device. Elements
-// are rounded as scalars are, so the bits are equal everywhere.
+// SIMD on eight floats: AVX2 on a host, otherwise scalar code. The bits are equal everywhere.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -10,8 +9,7 @@
 
 namespace pictura {
 
-// Two types, because a program may contain code with and without AVX2. The memory layouts of both types are equal, but
-// their calling conventions differ.
+// Two types, because programs may mix code with and without AVX2. Their calling conventions differ.
 #if defined(__AVX2__) && !defined(__CUDACC__)
 inline namespace float8_in_a_register {
 
@@ -27,7 +25,7 @@ inline Float8 set8(float a, float b, float c, float d, float e, float f, float g
 }
 inline Float8 load8(const float* from) { return {_mm256_loadu_ps(from)}; }
 inline void store8(const Float8& a, float* to) { _mm256_storeu_ps(to, a.value); }
-/// Loads integers as floats. A float must represent each integer exactly.
+/// A float must represent each integer exactly.
 inline Float8 load8_integers(const int32_t* from) {
   return {_mm256_cvtepi32_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)))};
 }
@@ -42,16 +40,16 @@ inline Float8 operator-(const Float8& a) { return {_mm256_xor_ps(_mm256_set1_ps(
 inline Float8 magnitude(const Float8& a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.value)}; }
 inline Float8 round_down(const Float8& a) { return {_mm256_floor_ps(a.value)}; }
 inline Float8 round_up(const Float8& a) { return {_mm256_ceil_ps(a.value)}; }
-/// Lane-wise versions of the scalar functions of the same names.
+/// Lane-wise versions of the scalar functions.
 inline Float8 min_no_nan(const Float8& a, const Float8& b) { return {_mm256_min_ps(a.value, b.value)}; }
 inline Float8 max_no_nan(const Float8& a, const Float8& b) { return {_mm256_max_ps(a.value, b.value)}; }
 inline Float8 sqrt_in_range(const Float8& a) { return {_mm256_sqrt_ps(a.value)}; }
-/// Clears the bits of each element that are not set in `bits`.
+/// Bitwise AND of each element with `bits`.
 inline Float8 keep_bits(const Float8& a, uint32_t bits) {
   return {_mm256_and_ps(a.value, _mm256_castsi256_ps(_mm256_set1_epi32(static_cast<int32_t>(bits))))};
 }
 
-/// A mask: in each element, either all bits are set or none.
+/// A mask: all bits of an element are set, or none.
 struct Mask8 {
   __m256 bits;
 };
@@ -61,7 +59,7 @@ inline Mask8 operator^(const Mask8& a, const Mask8& b) { return {_mm256_xor_ps(a
 inline Mask8 operator~(const Mask8& a) { return {_mm256_xor_ps(a.bits, _mm256_castsi256_ps(_mm256_set1_epi32(-1)))}; }
 inline Mask8 operator<(const Float8& a, const Float8& b) { return {_mm256_cmp_ps(a.value, b.value, _CMP_LT_OQ)}; }
 inline Mask8 operator<=(const Float8& a, const Float8& b) { return {_mm256_cmp_ps(a.value, b.value, _CMP_LE_OQ)}; }
-/// Compares elements as unsigned integers with the same bits.
+/// Compares the bits as unsigned integers.
 inline Mask8 less_bits(const Float8& a, const Float8& b) {
   const __m256i lowest = _mm256_set1_epi32(INT32_MIN);
   const __m256i of_a = _mm256_xor_si256(_mm256_castps_si256(a.value), lowest);
@@ -71,9 +69,9 @@ inline Mask8 less_bits(const Float8& a, const Float8& b) {
 inline Mask8 equal_bits(const Float8& a, const Float8& b) {
   return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_castps_si256(a.value), _mm256_castps_si256(b.value)))};
 }
-/// Returns a mask as an integer: bit k is set if element k is set.
+/// Returns an integer whose bit k is element k.
 inline uint32_t bits_of(const Mask8& mask) { return static_cast<uint32_t>(_mm256_movemask_ps(mask.bits)); }
-/// Returns element k of a if element k of the mask is set, else element k of b.
+/// Element k of a where element k of the mask is set, else of b.
 inline Float8 select(const Mask8& mask, const Float8& a, const Float8& b) {
   return {_mm256_blendv_ps(b.value, a.value, mask.bits)};
 }
@@ -81,26 +79,26 @@ inline Float8 select(const Mask8& mask, const Float8& a, const Float8& b) {
 /// Exchanges elements 2k and 2k + 1.
 inline Float8 swap_pairs(const Float8& a) { return {_mm256_permute_ps(a.value, 0xB1)}; }
 
-/// Returns element k of b if bit k of kMask is set, else element k of a.
+/// Element k of b where bit k of kMask is set, else of a.
 template <int kMask>
 inline Float8 blend(const Float8& a, const Float8& b) {
   return {_mm256_blend_ps(a.value, b.value, kMask)};
 }
 
-/// Returns elements k0 to k7 of a.
+/// Returns the elements k0 to k7 of a.
 template <int k0, int k1, int k2, int k3, int k4, int k5, int k6, int k7>
 inline Float8 permute(const Float8& a) {
   return {_mm256_permutevar8x32_ps(a.value, _mm256_setr_epi32(k0, k1, k2, k3, k4, k5, k6, k7))};
 }
 
-/// Loads eight consecutive pairs, and separates their first elements from their second elements.
+/// Loads eight pairs, and separates first from second elements.
 inline void load_pairs(const float* from, Float8* first_out, Float8* second_out) {
   const __m256 a = _mm256_loadu_ps(from), b = _mm256_loadu_ps(from + 8);
   const __m256 low = _mm256_permute2f128_ps(a, b, 0x20), high = _mm256_permute2f128_ps(a, b, 0x31);
   first_out->value = _mm256_shuffle_ps(low, high, 0x88);
   second_out->value = _mm256_shuffle_ps(low, high, 0xDD);
 }
-/// Loads the pairs with the given indices, and separates them as load_pairs() does.
+/// Loads the pairs with these indices, as load_pairs() does.
 inline void gather_pairs(const float* from, const int32_t* indices, Float8* first_out, Float8* second_out) {
   const auto two = [&](int k) {
     const auto pair = [&](int i) { return reinterpret_cast<const __m64*>(from + 2 * int64_t{indices[i]}); };
@@ -110,10 +108,10 @@ inline void gather_pairs(const float* from, const int32_t* indices, Float8* firs
   first_out->value = _mm256_shuffle_ps(low, high, 0x88);
   second_out->value = _mm256_shuffle_ps(low, high, 0xDD);
 }
-/// Loads four unaligned floats at from(k) for each element k: four_out[j] holds the j-th float of each element.
+/// For each element k, loads four unaligned floats at from(k). Float j goes to four_out[j].
 template <typename From>
 inline void gather_fours(From&& from, Float8* four_out) {
-  // The floats of elements k and k + 4 occupy the halves of one register.
+  // Elements k and k + 4 are the halves of one register.
   const auto two = [&](int k) {
     const auto four = [&](int i) { return _mm_loadu_ps(static_cast<const float*>(from(i))); };
     return _mm256_set_m128(four(k + 4), four(k));
@@ -127,7 +125,7 @@ inline void gather_fours(From&& from, Float8* four_out) {
   four_out[3].value = _mm256_shuffle_ps(high_01, high_23, 0xEE);
 }
 
-/// For each value of a byte, the places of its set bits in ascending order.
+/// For each byte, the places of its set bits, ascending.
 struct SetBits {
   alignas(8) uint8_t places[256][8];
   constexpr SetBits() : places{} {
@@ -140,31 +138,30 @@ struct SetBits {
 };
 inline constexpr SetBits kSetBits;
 
-/// Places of the set bits of one byte, as integers.
 inline __m256i set_bits(uint32_t mask) {
   return _mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(kSetBits.places[mask])));
 }
 
-/// Copies the 32-bit elements whose bits are set in the mask, without gaps. May overwrite eight elements of `to`.
+/// Copies the elements in the mask, without gaps. May overwrite eight elements of `to`.
 template <typename Word>
 inline void copy_chosen(const Word* from, uint32_t mask, Word* to) {
   static_assert(sizeof(Word) == sizeof(int32_t));
   const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutevar8x32_epi32(all, set_bits(mask)));
 }
-/// Writes the integer first + k for each set bit k of the mask, without gaps. May overwrite eight elements of `to`.
+/// Writes first + k for each set bit k, without gaps. May overwrite eight elements of `to`.
 inline void store_chosen(int32_t first, uint32_t mask, int32_t* to) {
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_add_epi32(set_bits(mask), _mm256_set1_epi32(first)));
 }
-/// Returns a bit mask: bit k is set if integer k equals the value.
+/// Returns an integer whose bit k is set if integer k equals the value.
 inline uint32_t equal8(const int32_t* integers, int32_t value) {
   const __m256i all = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(integers));
   const __m256i equal = _mm256_cmpeq_epi32(all, _mm256_set1_epi32(value));
   return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_castsi256_ps(equal)));
 }
 
-/// The 4 * kFours smallest 64-bit keys inserted so far, in ascending order. Keys must be in [0, 0x7FF0...0), where
-/// integers have the same order as the doubles with the same bits.
+/// The kCount smallest inserted keys, ascending. Keys must be in [0, 0x7FF0...0), where integers are ordered as the
+/// doubles with the same bits.
 template <int kFours>
 struct SmallestKeys {
   static constexpr int kCount = 4 * kFours;
@@ -174,13 +171,13 @@ struct SmallestKeys {
   SmallestKeys() {
     for (__m256d& four : keys) four = _mm256_castsi256_pd(_mm256_set1_epi64x(kNone));
   }
-  /// Inserts a key and drops the largest, which may be the new key.
+  /// Inserts a key and drops the largest.
   void insert(int64_t key) {
     const __m256d all_new = _mm256_castsi256_pd(_mm256_set1_epi64x(key));
-    __m256d carried = _mm256_setzero_pd();  // the element before the current four
+    __m256d carried = _mm256_setzero_pd();  // element before the current four
     for (__m256d& four : keys) {
       const __m256d rotated = _mm256_permute4x64_pd(four, 0x93);
-      // An element that is larger than the new key becomes the larger of its predecessor and the new key.
+      // A larger element becomes the larger of the new key and the element's predecessor.
       four = _mm256_max_pd(_mm256_min_pd(four, all_new), _mm256_blend_pd(rotated, carried, 1));
       carried = rotated;
     }
@@ -201,7 +198,7 @@ struct alignas(32) Float8 {
   }
   PICTURA_HD float operator[](int k) const { return value[k]; }
 };
-/// Returns a vector of the elements `of(0)` to `of(7)`.
+/// Vector of of(0) to of(7).
 template <typename Of>
 PICTURA_HD inline Float8 make_float8(Of&& of) {
   Float8 result;
@@ -264,7 +261,7 @@ PICTURA_HD inline Float8 keep_bits(const Float8& a, uint32_t bits) {
 struct alignas(32) Mask8 {
   int32_t bits[8];
 };
-/// Returns a mask whose element k is set if is(k) is true.
+/// Mask of is(0) to is(7).
 template <typename Is>
 PICTURA_HD inline Mask8 make_mask8(Is&& is) {
   Mask8 mask;
@@ -374,14 +371,11 @@ struct alignas(32) SmallestKeys {
 
 PICTURA_HD inline Mask8 operator>(const Float8& a, const Float8& b) { return b < a; }
 PICTURA_HD inline Mask8 operator>=(const Float8& a, const Float8& b) { return b <= a; }
-/// Lane-wise versions of the scalar functions of the same names.
+/// Lane-wise versions of the scalar functions.
 PICTURA_HD inline Float8 reciprocal_in_range(const Float8& a) { return 1.0f / a; }
 PICTURA_HD inline Float8 saturate(const Float8& a) { return min_no_nan(max_no_nan(a, 0.0f), 1.0f); }
 
-/// Bit masks that select `count` of eight elements: the first or the last. They select the rest of an array that is
-/// processed in groups of eight: first_lanes_mask() if the rest is padded to eight elements, last_lanes_mask() if the
-/// array's last eight elements are read. first_lanes_mask() accepts any count: above 8, all bits are set; below 0,
-/// none.
+/// Masks of the first or last `count` of eight elements. first_lanes_mask() accepts any count.
 PICTURA_HD constexpr uint32_t first_lanes_mask(int count) {
   return count >= 8 ? 0xFFu : count <= 0 ? 0u : (1u << count) - 1;
 }

@@ -1,6 +1,5 @@
-// PICTURA_HD marks a function that runs on host and device. This header also provides fixed-width integers and C math
-// functions to all headers of host and CUDA code, including code compiled by NVRTC, which has no standard library.
-// Compiler-dependent code belongs in this folder.
+// PICTURA_HD marks functions for host and device. NVRTC has no standard library, so this header also declares
+// fixed-width integers. Compiler-dependent code belongs in this folder.
 #pragma once
 
 #if defined(__CUDACC__)
@@ -8,14 +7,13 @@
 #else
 #define PICTURA_HD
 #endif
-// Prevents unrolling of a kernel's loop: unrolled kernels exceed the instruction cache, and instruction fetches cost
-// more than the loop.
+// Prevents unrolling, because unrolled kernels exceed the instruction cache.
 #if defined(__CUDA_ARCH__)
 #define PICTURA_NO_UNROLL _Pragma("unroll 1")
 #else
 #define PICTURA_NO_UNROLL
 #endif
-// Unrolls a loop over a face's corners by four: nearly all faces have four corners, which then stay in registers.
+// Unrolls a loop over a face's corners by four, the usual number, so that corners stay in registers.
 #if defined(__CUDA_ARCH__)
 #define PICTURA_UNROLL_FOUR _Pragma("unroll 4")
 #else

@@ -1,4 +1,4 @@
-// SIMD on eight 16-bit integers: an operation is one instruction on a host and four on a CUDA device.
+// SIMD on eight 16-bit integers.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -6,14 +6,12 @@
 namespace pictura {
 
 #if !defined(__CUDA_ARCH__)
-// Vector types of the compiler, because g++ 12 compiles arrays in inlined functions to scalar code. Arithmetic on
-// unsigned elements wraps around.
+// Vector types, because g++ 12 compiles arrays in inlined functions to scalar code. Unsigned arithmetic wraps around.
 using Int16Vector = int16_t __attribute__((vector_size(16)));
 using Uint16Vector = uint16_t __attribute__((vector_size(16)));
 #endif
 
-/// Eight 16-bit integers. On a device, word k holds elements k and k + 4 as its lower and upper half, because
-/// instructions operate on pairs. On a host, the elements are contiguous in one register.
+/// Eight 16-bit integers. On a device, word k holds elements k (lower half) and k + 4.
 struct Int16x8 {
 #if defined(__CUDA_ARCH__)
   uint32_t halves[4];
@@ -23,7 +21,7 @@ struct Int16x8 {
 };
 constexpr int kInt16x8Size = 8, kInt16x8Half = 4;
 
-/// Returns a vector of the elements `of(0)` to `of(7)`.
+/// Vector of of(0) to of(7).
 template <typename Of>
 PICTURA_HD inline Int16x8 make_int16x8(Of&& of) {
   Int16x8 result;
@@ -37,8 +35,7 @@ PICTURA_HD inline Int16x8 make_int16x8(Of&& of) {
   return result;
 }
 
-/// Returns a vector whose element k is base + (k - 4) * step. Each element must be in [0, 65,536) and is stored in 16
-/// bits.
+/// Element k is base + (k - 4) * step, which must be in [0, 65,536).
 PICTURA_HD inline Int16x8 arithmetic_sequence(int32_t step, int32_t base) {
 #if defined(__CUDA_ARCH__)
   Int16x8 result;
@@ -53,7 +50,7 @@ PICTURA_HD inline Int16x8 arithmetic_sequence(int32_t step, int32_t base) {
 #endif
 }
 
-/// A word whose two halves are both the lower half of `word`.
+/// Copies the lower half of `word` to both halves.
 PICTURA_HD inline uint32_t broadcast_low16(uint32_t word) {
 #if defined(__CUDA_ARCH__)
   return __byte_perm(word, 0, 0x1010);
@@ -63,13 +60,13 @@ PICTURA_HD inline uint32_t broadcast_low16(uint32_t word) {
 }
 
 #if !defined(__CUDA_ARCH__)
-/// a + b for each element, wrapping around; b has 16 bits.
+/// a + b, wrapping around at 16 bits.
 inline Int16Vector wrapped_sum(const Int16x8& a, uint32_t b) {
   return reinterpret_cast<Int16Vector>(reinterpret_cast<Uint16Vector>(a.value) + static_cast<uint16_t>(b));
 }
 #endif
 
-/// max(a + b, c) and min(a + b, c) for each element; both halves of b must be equal, and sums wrap around at 16 bits.
+/// max(a + b, c) and min(a + b, c). Both halves of b must be equal. Sums wrap around at 16 bits.
 PICTURA_HD inline Int16x8 add_max(const Int16x8& a, uint32_t b, const Int16x8& c) {
 #if defined(__CUDA_ARCH__)
   Int16x8 result;
@@ -91,7 +88,7 @@ PICTURA_HD inline Int16x8 add_min(const Int16x8& a, uint32_t b, const Int16x8& c
 #endif
 }
 
-/// a + b, clamped to [0, high], for each element. Sums must not overflow 16 bits.
+/// a + b, clamped to [0, high]. Sums must not overflow 16 bits.
 PICTURA_HD inline Int16x8 add_clamp(const Int16x8& a, const Int16x8& b, const Int16x8& high) {
 #if defined(__CUDA_ARCH__)
   Int16x8 result;
@@ -106,8 +103,7 @@ PICTURA_HD inline Int16x8 add_clamp(const Int16x8& a, const Int16x8& b, const In
 }
 
 #if defined(__CUDA_ARCH__)
-/// Looks up four bytes of `table` by four selectors of four bits. A selector above 7 gives the sign bit of byte
-/// (selector - 8), replicated over 8 bits (unlike __byte_perm).
+/// Looks up four bytes of `table` by 4-bit selectors. Selector s > 7 gives the sign bit of byte s - 8, in all 8 bits.
 __device__ inline uint32_t bytes_of(uint64_t table, uint32_t selectors) {
   uint32_t bytes;
   asm("prmt.b32 %0, %1, %2, %3;"
@@ -115,7 +111,7 @@ __device__ inline uint32_t bytes_of(uint64_t table, uint32_t selectors) {
       : "r"(static_cast<uint32_t>(table)), "r"(static_cast<uint32_t>(table >> 32)), "r"(selectors));
   return bytes;
 }
-/// Returns bits 7 to 10 of the elements as selectors, with the first four elements in the lower half.
+/// Bits 7 to 10 of the elements, as selectors.
 __device__ inline uint32_t selectors_of(const Int16x8& a) {
   const uint32_t low = (a.halves[0] >> 7 & 0x000F000Fu) | (a.halves[1] >> 3 & ~0x000F000Fu),
                  high = (a.halves[2] << 1 & 0x0F000F00u) | (a.halves[3] << 5 & ~0x0F000F00u);
@@ -123,12 +119,12 @@ __device__ inline uint32_t selectors_of(const Int16x8& a) {
 }
 #endif
 
-/// Returns a bit mask per element: in byte k, the bits from (from[k] / 128) up to but excluding (to[k] / 128) are set.
-/// Requires 0 <= from[k] <= to[k] <= 8 * 128.
+/// Byte k of the result has the bits from (from[k] / 128) up to, but excluding, (to[k] / 128). Requires 0 <= from[k] <=
+/// to[k] <= 8 * 128.
 PICTURA_HD inline uint64_t bits_between(const Int16x8& from, const Int16x8& to) {
 #if defined(__CUDA_ARCH__)
-  // Byte i of the table is the mask of bits i to 7, with its upper four bits XORed with its lower four. So byte 0 has
-  // no sign bit, and selector 8 gives 0.
+  // Byte i is the mask of bits i to 7, with its upper four bits XORed with its lower four. So byte 0 has no sign bit,
+  // and selector 8 gives 0.
   constexpr uint64_t kTable = 0x80C0E0F0783C1E0Full;
   constexpr uint32_t kUpperFour = 0xF0F0F0F0u;
   const uint32_t begin = selectors_of(from), end = selectors_of(to);
@@ -141,7 +137,7 @@ PICTURA_HD inline uint64_t bits_between(const Int16x8& from, const Int16x8& to) 
   const Uint32Vector one{1, 1, 1, 1, 1, 1, 1, 1};
   const Uint32Vector bits = (one << __builtin_convertvector(to.value >> 7, Uint32Vector)) -
                             (one << __builtin_convertvector(from.value >> 7, Uint32Vector));
-  // Converted from 32 to 16 to 8 bits, because instructions exist for these two steps.
+  // Two steps, for which instructions exist.
   const auto bytes = __builtin_convertvector(__builtin_convertvector(bits, Uint16Vector), Bytes);
   return __builtin_bit_cast(uint64_t, bytes);
 #endif

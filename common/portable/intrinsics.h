@@ -1,12 +1,12 @@
-// Scalar operations that take one or a few instructions on a CUDA device. Results on host and device are bitwise equal.
+// Scalar operations that are fast on a CUDA device. Results on host and device are bitwise equal.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
 
 namespace pictura {
 
-/// 1 / x and the square root of x, correctly rounded (IEEE 754), for |x| in [2^-100, 2^100]. The device code is what
-/// the CUDA compiler generates for that range, without the test of the range.
+/// 1 / x and sqrt(x), correctly rounded (IEEE 754), for |x| in [2^-100, 2^100]. The device code omits the compiler's
+/// test of the range.
 PICTURA_HD inline float reciprocal_in_range(float x) {
 #if defined(__CUDA_ARCH__)
   float guess;
@@ -27,7 +27,6 @@ PICTURA_HD inline float sqrt_in_range(float x) {
 #endif
 }
 
-/// The float with the given bits.
 PICTURA_HD inline float float_from_bits(uint32_t bits) {
 #if defined(__CUDA_ARCH__)
   return __uint_as_float(bits);
@@ -38,14 +37,12 @@ PICTURA_HD inline float float_from_bits(uint32_t bits) {
 #endif
 }
 
-/// Minimum and maximum: one instruction on a device or a host. Arguments must not be NaN: if one is NaN, a device
-/// returns the other argument and a host returns b. If the arguments are +0 and -0, either may be returned.
+/// Arguments must not be NaN. For +0 and -0, either may be returned.
 PICTURA_HD inline float min_no_nan(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return fminf(a, b);
 #elif defined(__AVX__)
-  // Inline assembly, because g++ 12 compiles a conditional expression with a constant b to a branch. Processors often
-  // mispredict that branch for the edges of a pixel.
+  // Assembly, because g++ 12 compiles a constant b to a branch, which is often mispredicted.
   float minimum;
   asm("vminss %2, %1, %0" : "=x"(minimum) : "x"(a), "xm"(b));
   return minimum;
@@ -65,7 +62,7 @@ PICTURA_HD inline float max_no_nan(float a, float b) {
 #endif
 }
 
-/// x clamped to [0, 1]; one instruction on a device. x must not be NaN.
+/// x clamped to [0, 1]; x must not be NaN.
 PICTURA_HD inline float saturate(float x) {
 #if defined(__CUDA_ARCH__)
   return __saturatef(x);
@@ -74,7 +71,6 @@ PICTURA_HD inline float saturate(float x) {
 #endif
 }
 
-/// The bits of a float.
 PICTURA_HD inline uint32_t bits_from_float(float x) {
 #if defined(__CUDA_ARCH__)
   return __float_as_uint(x);
@@ -83,8 +79,7 @@ PICTURA_HD inline uint32_t bits_from_float(float x) {
 #endif
 }
 
-/// Returns x, and prevents the CUDA compiler from computing x again. Otherwise the compiler moves cheap computations
-/// into loops.
+/// Returns x. Prevents the CUDA compiler from computing x again within loops.
 PICTURA_HD inline float no_rematerialize(float x) {
 #if defined(__CUDA_ARCH__)
   asm volatile("" : "+f"(x));
@@ -92,7 +87,6 @@ PICTURA_HD inline float no_rematerialize(float x) {
   return x;
 }
 
-/// Number of set bits.
 PICTURA_HD inline int popcount(uint64_t bits) {
 #if defined(__CUDA_ARCH__)
   return __popcll(bits);

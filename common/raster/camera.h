@@ -1,5 +1,5 @@
-// Cameras of the rasterizers: pose, projection and frustum. Camera coordinates are (right, down, forward) in metres;
-// the third coordinate is the depth. Shared by host and CUDA code.
+// Cameras of the rasterizers, for host and CUDA code. Camera coordinates are (right, down, forward) in metres. The
+// depth is the third coordinate.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -8,16 +8,14 @@
 
 namespace pictura {
 
-/// Depth of the near plane.
 constexpr float kNear_m = 0.1f;
-/// Width of the guard band: polygons are clipped this far outside the image. It is large enough that most polygons need
-/// no clipping, and small enough that screen coordinates keep their precision.
+/// Width of the guard band: polygons are clipped this far outside the image. Most polygons then need no clipping, and
+/// screen coordinates keep their precision.
 constexpr float kGuardBand_px = 8.0f;
 
-/// Maximum number of cameras of a rig.
 constexpr int kMaxCameras = 64;
 
-/// A camera of a rig (pose in the ego frame) or of a view (pose in the world).
+/// A camera of a rig (in the ego frame) or of a view (in the world).
 struct PinholeCamera {
   Vec3 position_m;
   Vec3 right, down, forward;
@@ -25,8 +23,8 @@ struct PinholeCamera {
   int32_t width_px = 0, height_px = 0;
 };
 
-/// Places a rig's camera in the world, at the pose of a view. For bodies shorter than View::kRigBodyLength_m, the x
-/// offset shrinks in proportion to the body's length.
+/// Places a rig's camera at a view's pose. The camera's x offset shrinks for bodies shorter than
+/// View::kRigBodyLength_m.
 PICTURA_HD inline PinholeCamera place_camera(const PinholeCamera& in_ego, const View& view) {
   const float shrink = min_of(1.0f, view.body_length_m / View::kRigBodyLength_m);
   const float c = view.cos_heading, s = view.sin_heading;
@@ -45,8 +43,8 @@ PICTURA_HD inline Vec3 to_camera(const PinholeCamera& camera, Vec3 world_m) {
   return {dot(camera.right, d), dot(camera.down, d), dot(camera.forward, d)};
 }
 
-/// View frustum, which depends only on the projection. It holds the slopes x/depth and y/depth of the four sides
-/// (including the guard band), factors that normalise distances to the sides, and the slopes of one pixel.
+/// View frustum, including the guard band. It holds the slopes x/depth and y/depth of the sides, scales for distances
+/// to the sides, and the slopes of one pixel.
 struct Frustum {
   float x_low = 0, x_high = 0, y_low = 0, y_high = 0;
   float x_low_scale = 0, x_high_scale = 0, y_low_scale = 0, y_high_scale = 0;
@@ -69,8 +67,8 @@ PICTURA_HD inline Frustum make_frustum(const PinholeCamera& camera) {
   return f;
 }
 
-/// Returns false if a sphere (camera coordinates) is entirely outside one plane of the frustum or beyond the visible
-/// range, where all faces have faded to black.
+/// Whether a sphere (camera coordinates) may be visible. False if it is entirely outside one plane or beyond the
+/// visible range.
 PICTURA_HD inline bool sphere_in_frustum(const Frustum& f, Vec3 center, float radius_m) {
   // No short circuits, because lanes of a warp would diverge.
   const bool in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < kVisibleRange_m);
@@ -81,14 +79,14 @@ PICTURA_HD inline bool sphere_in_frustum(const Frustum& f, Vec3 center, float ra
   return in_range & in_width & in_height;
 }
 
-/// Position of corner 0 to 3 of the frustum at the visible range, in world coordinates.
+/// Corner 0 to 3 of the frustum at the visible range, in world coordinates.
 PICTURA_HD inline Vec3 far_corner(const PinholeCamera& camera, const Frustum& f, int corner) {
   const float x = (corner & 1) ? f.x_high : f.x_low;
   const float y = (corner & 2) ? f.y_high : f.y_low;
   return camera.position_m + (camera.right * x + camera.down * y + camera.forward) * kVisibleRange_m;
 }
 
-/// Bounding box, on the ground plane, of the part of the frustum within the visible range.
+/// Bounding box of the frustum within the visible range, on the ground plane.
 PICTURA_HD inline Aabb2 frustum_ground_box(const PinholeCamera& camera, const Frustum& f) {
   Aabb2 box{camera.position_m.xy(), camera.position_m.xy()};
   for (int corner = 0; corner < 4; ++corner) {
@@ -99,10 +97,9 @@ PICTURA_HD inline Aabb2 frustum_ground_box(const PinholeCamera& camera, const Fr
   return box;
 }
 
-/// Bounding box, on the ground plane, of the centres of all spheres of at most this radius for which
-/// sphere_in_frustum() is true. At each depth, the centres are in the frustum's cross-section, widened on all sides.
+/// Bounding box, on the ground plane, of the centres of spheres up to this radius that sphere_in_frustum() accepts.
 PICTURA_HD inline Aabb2 ground_box_of_spheres(const PinholeCamera& camera, const Frustum& f, float radius_m) {
-  const float leeway_m = 0.01f * radius_m + 0.1f;  // exceeds the rounding errors of coordinate sums
+  const float leeway_m = 0.01f * radius_m + 0.1f;  // above the rounding errors of coordinate sums
   const float reach_m = radius_m + leeway_m;
   Aabb2 box;
   for (int corner = 0; corner < 8; ++corner) {
@@ -118,7 +115,7 @@ PICTURA_HD inline Aabb2 ground_box_of_spheres(const PinholeCamera& camera, const
   return box;
 }
 
-/// Cells of a grid that a box touches, as half-open ranges; empty if the grid has no items.
+/// Cells of a grid that a box touches, as half-open ranges.
 struct CellRange {
   int x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
 };
@@ -128,8 +125,7 @@ PICTURA_HD inline CellRange cells_of(const GridView& grid, const Aabb2& box) {
   return {grid.cell_x(box.low.x), grid.cell_x(box.high.x) + 1, grid.cell_y(box.low.y), grid.cell_y(box.high.y) + 1};
 }
 
-/// Whether (cell_x, cell_y) is the first cell of the query that contains the item. An item in several cells is visited
-/// only in its first cell.
+/// Whether (cell_x, cell_y) is the item's first cell within the query.
 PICTURA_HD inline bool is_first_visit(const GridView& grid, const CellRange& query, const Aabb2& item_box, int cell_x,
                                       int cell_y) {
   return cell_x == max_of(grid.cell_x(item_box.low.x), query.x_begin) &&

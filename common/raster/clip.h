@@ -1,4 +1,4 @@
-// Clips faces in camera coordinates to the near plane and the guard band. Shared by host and CUDA code.
+// Clipping of faces in camera coordinates to the near plane and the guard band. For host and CUDA code.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -7,13 +7,11 @@
 
 namespace pictura {
 
-/// Clipping by five planes adds at most one corner per plane. One more is needed because a step of clip_face() can
-/// write two corners.
+/// Each of the five planes adds at most one corner. A step of clip_face() can write one more.
 constexpr int kMaxPolygonCorners = kMaxFaceCorners + 6;
 
-/// One of the five planes of the frustum: the near plane and four sides. inside() is a distance from the plane,
-/// negative outside, in a unit that depends on the plane. Each plane has coefficients for all terms, so that lanes of a
-/// warp can use different planes without branches.
+/// A plane of the frustum: the near plane or one of four sides. inside() is negative outside. Its unit depends on the
+/// plane. All planes evaluate the same terms, so that lanes of a warp do not diverge.
 constexpr int kClipPlanes = 5;
 class ClipPlane {
  public:
@@ -32,7 +30,7 @@ class ClipPlane {
   float x_, y_, z_, offset_;
 };
 
-/// Bit mask of the planes for which a point is on the outer side.
+/// Bit mask of the planes for which a point is outside.
 PICTURA_HD inline unsigned planes_outside(const Frustum& f, Vec3 p) {
   unsigned outside = 0;
   for (int plane = 0; plane < kClipPlanes; ++plane) {
@@ -41,8 +39,7 @@ PICTURA_HD inline unsigned planes_outside(const Frustum& f, Vec3 p) {
   return outside;
 }
 
-/// Bit mask of the frustum's planes that a face (camera coordinates) crosses; kOutside if it is entirely outside one
-/// plane.
+/// Bit mask of the planes that a face crosses, or kOutside if the face is entirely outside one plane.
 constexpr unsigned kOutside = ~0u;
 template <typename Corners>
 PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Corners& corners, int count) {
@@ -56,8 +53,8 @@ PICTURA_HD inline unsigned planes_crossed(const Frustum& f, const Corners& corne
   return outside_of_all != 0 ? kOutside : outside_of_any;
 }
 
-/// Intersection of the side from a to b with a plane, given inside() of a and of b. It is computed from the inner of
-/// the two corners, so that two faces with a common side get the same point.
+/// Intersection of the side from a to b with a plane, given inside() of both ends. It is computed from the inner end,
+/// so that faces with a common side get the same point.
 PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_inside) {
   const bool a_is_inner = a_inside >= 0.0f;
   const Vec3 inner = a_is_inner ? a : b, outer = a_is_inner ? b : a;
@@ -65,12 +62,10 @@ PICTURA_HD inline Vec3 cut_between(Vec3 a, float a_inside, Vec3 b, float b_insid
   return inner + (outer - inner) * (inside * reciprocal_in_range(inside - outside));
 }
 
-/// Maximum number of corners that widen_in_front() emits.
 constexpr int kMaxWidenedCorners = 5;
-/// Widens a strip in camera coordinates to at least floor_px on screen. If the strip crosses the near plane, it is cut
-/// there at its original width, and only its far end is widened, so that its sides stay in place near the camera. Calls
-/// emit(i, corner) for i = 0, 1, ... and returns the number of corners. For other faces, floor_px is 0 and the corners
-/// do not change.
+/// Widens a strip to at least floor_px on screen. If the strip crosses the near plane, cuts the strip there and widens
+/// only its far end. If floor_px is 0, the corners do not change. Calls emit(i, corner) and returns the number of
+/// corners.
 template <typename Emit>
 PICTURA_HD inline int widen_in_front(const PinholeCamera& camera, float floor_px, const Vec3* corners, Emit&& emit) {
   Vec3 widened[4];
@@ -90,8 +85,8 @@ PICTURA_HD inline int widen_in_front(const PinholeCamera& camera, float floor_px
   return count;
 }
 
-/// Clips a convex face to the near plane and the guard band. Writes at most kMaxPolygonCorners corners (camera
-/// coordinates) to polygon_out and returns their number. A number below 3 means that nothing is left.
+/// Clips a convex face. Writes at most kMaxPolygonCorners corners and returns their number. Below 3 corners, nothing is
+/// left.
 PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count, Vec3* polygon_out) {
   const unsigned crossed = planes_crossed(f, corners, count);
   if (crossed == kOutside) return 0;
@@ -104,7 +99,7 @@ PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count
     for (int i = 0; i < count; ++i) polygon_out[i] = corners[i];
     return count;
   }
-  // `buffer` and polygon_out alternate as outputs, so that the last plane writes to polygon_out.
+  // The buffers alternate, so that the last plane writes to polygon_out.
   PICTURA_NO_UNROLL
   for (int number = 0; number < kClipPlanes; ++number) {
     if (!((crossed >> number) & 1u)) continue;
@@ -113,7 +108,7 @@ PICTURA_HD inline int clip_face(const Frustum& f, const Vec3* corners, int count
     int kept = 0;
     Vec3 previous = from[count - 1];
     float previous_inside = plane.inside(previous);
-    // Only a face that is not exactly convex can exceed the maximum; the excess corners are dropped.
+    // Only a face that is not exactly convex exceeds the maximum.
     PICTURA_NO_UNROLL
     for (int i = 0; i < count && kept + 2 <= kMaxPolygonCorners; ++i) {
       const Vec3 current = from[i];

@@ -1,6 +1,5 @@
-// Compositing: how much each fragment of a pixel weighs in the pixel's colour, computed from the fragment's visible
-// samples. A fragment is the part of a pixel that one face covers. Also converts colours to the formats of images.
-// Shared by host and CUDA code.
+// Compositing: the weight of each fragment in a pixel's colour, and conversion of colours to image formats. A fragment
+// is the part of a pixel that one face covers. For host and CUDA code.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -8,25 +7,24 @@
 
 namespace pictura {
 
-/// Accumulator of a pixel's fragments. It sums integers, so that the sums do not depend on the order of the fragments.
+/// Accumulator of a pixel's fragments. Its integer sums do not depend on the order of fragments.
 class PixelAccumulator {
  public:
-  /// Kind of a fragment. kWhole: entirely visible, weighted by its exact area. kPartial: partly occluded, weighted by
-  /// its area times the visible fraction of its samples. kRemainder: covers the whole pixel. Fragments of kind
-  /// kRemainder share the area that the other fragments leave, in proportion to their visible samples.
+  /// Kind of a fragment. kWhole: entirely visible, weighted by its area. kPartial: partly occluded, weighted by its
+  /// area times its visible share of samples. kRemainder: covers the whole pixel. kRemainder fragments share the
+  /// remaining area in proportion to their visible samples.
   enum Kind : uint8_t { kWhole, kPartial, kRemainder, kNumKinds };
   struct Weight {
     float area = 0;
     Kind kind = kWhole;
   };
-  /// One factor per kind, by which weights are multiplied. The factors are known after all fragments have been added.
+  /// One factor of the weights per kind, known after all fragments have been added.
   struct Shares {
     float of_kind[kNumKinds] = {1.0f, 1.0f, 1.0f};
     PICTURA_HD float of(Weight weight) const { return weight.area * of_kind[weight.kind]; }
   };
 
-  /// Weight of a fragment. `visible` are the samples of effective_samples() (all 64 for a sliver) that no other
-  /// fragment occludes.
+  /// Weight of a fragment. `visible` are its effective_samples() that no other fragment occludes.
   PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, uint64_t visible) {
     const uint64_t samples = effective_samples(coverage);
     const float share = static_cast<float>(popcount(visible)) / static_cast<float>(popcount(samples));
@@ -35,7 +33,7 @@ class PixelAccumulator {
     return {coverage.area * share, kPartial};
   }
 
-  /// A fragment's weight, and its colour times the weight, as integers. Parts of one kind can be summed in any order.
+  /// A fragment's weight, and its colour times the weight, in integer units.
   struct Part {
     int32_t area = 0, r = 0, g = 0, b = 0;
   };
@@ -44,7 +42,7 @@ class PixelAccumulator {
             to_units(weight.area * color.b)};
   }
   PICTURA_HD void add(Kind kind, const Part& part) {
-    // Conditionals instead of an index, which would force the sums into a device's local memory.
+    // Conditionals, because an index would force the sums into a device's local memory.
     for (int k = 0; k < kNumKinds; ++k) {
       const bool is_its = k == kind;
       part_[k].area += is_its ? part.area : 0;
@@ -57,14 +55,12 @@ class PixelAccumulator {
 
   PICTURA_HD Shares shares() const {
     const float whole = area_of(kWhole), partial = area_of(kPartial);
-    // If the areas sum to more than a pixel, the remainder is reduced first, then partial fragments, then whole
-    // fragments, whose areas are exact.
+    // If the areas exceed a pixel, the remainder is reduced first, and whole fragments last.
     const float for_partial = max_of(1.0f - whole, 0.0f);
     Shares shares;
     if (whole > 1.0f) shares.of_kind[kWhole] = 1.0f / whole;
     if (partial > for_partial) shares.of_kind[kPartial] = for_partial / partial;
     const float remainder = area_of(kRemainder), left = max_of(for_partial - partial, 0.0f);
-    // Full fragments have a total area below 1 if divide_remainder() removed some of their samples.
     shares.of_kind[kRemainder] = remainder > 0.0f && remainder < 1.0f ? left / remainder : left;
     return shares;
   }
@@ -82,17 +78,15 @@ class PixelAccumulator {
   }
 
  private:
-  static constexpr float kUnits = 1 << 20;  // units per 1.0; sums of a thousand fragments do not overflow
+  static constexpr float kUnits = 1 << 20;  // per 1.0; sums of a thousand fragments do not overflow
   PICTURA_HD static int32_t to_units(float value) { return static_cast<int32_t>(value * kUnits + 0.5f); }
   PICTURA_HD float area_of(Kind kind) const { return static_cast<float>(part_[kind].area) * (1.0f / kUnits); }
 
   Part part_[kNumKinds];
 };
 
-/// Divides the remainder of a pixel among its full fragments, those that cover the whole pixel. for_each(visit) calls
-/// visit(coverage, &visible) for each fragment; `visible` are the fragment's samples that occlude_pair() left visible.
-/// From the visible samples of full fragments, this function removes those that the other fragments hide. It changes
-/// nothing if fewer than two fragments are full, or if no full fragment would keep a sample.
+/// Removes the visible samples of full fragments that other fragments hide. for_each(visit) calls visit(coverage,
+/// &visible) for each fragment. Changes nothing for fewer than two full fragments, or if no sample would remain.
 template <typename ForEach>
 PICTURA_HD inline void divide_remainder(ForEach&& for_each) {
   uint64_t hidden = 0, left = 0;
@@ -113,7 +107,7 @@ PICTURA_HD inline void divide_remainder(ForEach&& for_each) {
 /// Converts a channel to an IEEE half, rounded to nearest even.
 PICTURA_HD inline uint16_t to_half(float channel) {
   float mantissa = saturate(channel);
-  // Subnormal halves, below 2^-14, are multiples of 2^-24.
+  // Subnormal halves are multiples of 2^-24.
   if (mantissa < 6.103515625e-5f) return static_cast<uint16_t>(rintf(mantissa * 16777216.0f));
   int exponent = 15;
   for (; mantissa < 1.0f; --exponent) mantissa = mantissa * 2.0f;
@@ -121,9 +115,8 @@ PICTURA_HD inline uint16_t to_half(float channel) {
   return static_cast<uint16_t>(1024 * exponent + static_cast<int>(rintf((mantissa - 1.0f) * 1024.0f)));
 }
 
-/// Converts a channel to an unsigned byte.
 PICTURA_HD inline uint8_t to_byte(float channel) { return static_cast<uint8_t>(saturate(channel) * 255.0f + 0.5f); }
-/// Converts a byte's value to a bfloat16, which represents it exactly.
+/// Converts a byte's value to bfloat16, exactly.
 PICTURA_HD inline uint16_t bf16_of_byte(uint8_t byte) {
   return static_cast<uint16_t>(bits_from_float(static_cast<float>(byte)) >> 16);
 }
@@ -131,23 +124,23 @@ PICTURA_HD inline uint16_t bf16_of_byte(uint8_t byte) {
 PICTURA_HD inline uint32_t to_bytes(Rgb color) {
   return uint32_t{to_byte(color.r)} | uint32_t{to_byte(color.g)} << 8 | uint32_t{to_byte(color.b)} << 16;
 }
-/// Unpacks the bytes of to_bytes().
+/// Inverse of to_bytes().
 PICTURA_HD inline Rgb rgb_of_bytes(uint32_t bytes) {
   auto byte = [bytes](int index) { return static_cast<int>(bytes >> (8 * index) & 255u); };
   return rgb8(byte(0), byte(1), byte(2));
 }
 
-/// Visible weights of an agent, among all faces and alone, summed over its fragments in a view's images. The sums are
-/// integers, so that they do not depend on the order of the fragments.
+/// Visible weight of an agent in a view's images, among all faces and alone. Integer sums do not depend on the order of
+/// fragments.
 struct VisibilitySum {
   int64_t among_all = 0, alone = 0;
 
   PICTURA_HD static int64_t units_of(float weight) {
-    // Chosen so that the sum over the pixels of the largest rig, 64 images of 8192 x 8192, does not overflow.
+    // No overflow for 64 images of 8192 x 8192 pixels.
     constexpr float kUnits = 1 << 30;
     return static_cast<int64_t>(weight * kUnits);
   }
-  /// Visible weight among all faces divided by the weight of the agent alone; NaN if the agent alone has weight 0.
+  /// Visible share of the agent. NaN if the agent alone has weight 0.
   PICTURA_HD float share() const {
     if (alone <= 0) return float_from_bits(0x7FC00000u);
     const double share = static_cast<double>(among_all) / static_cast<double>(alone);

@@ -1,5 +1,5 @@
-// Coverage of a pixel by a convex polygon: the exact area and a mask of 64 samples. Shared by host and CUDA code; the
-// results of both are bitwise equal.
+// Coverage of a pixel by a convex polygon: the exact area and a mask of 64 samples. Bitwise equal on host and CUDA
+// devices.
 #pragma once
 
 #include "pictura/common/portable/int16x8.h"
@@ -16,51 +16,46 @@ PICTURA_HD inline bool covers_point(const PolygonEdge* edges, int count, float x
   return true;
 }
 
-/// Sample mask of a pixel: 8 columns of 8 rows. Each column is shifted down by a different fraction of a row, so that
-/// all 64 samples have different heights, because road scenes have many nearly level edges. Sample (column, row) is bit
-/// 8 * column + row.
+/// Mask of samples: 8 columns of 8 rows. Sample (column, row) is bit 8 * column + row. All samples have different
+/// heights, because many edges are nearly level.
 constexpr uint64_t kAllSamples = ~uint64_t{0};
 /// Offset of a column's first sample from the pixel's top, in rows.
 PICTURA_HD constexpr float sample_column_offset(int column) {
-  // Bit reversal of the column: neighbouring columns have distant offsets.
+  // Bit reversal gives neighbouring columns distant offsets.
   const int reversed = ((column & 1) << 2) | (column & 2) | ((column & 4) >> 2);
   return (static_cast<float>(reversed) + 0.5f) / 8.0f;
 }
 
-/// The coverage of one pixel by a polygon.
 struct PixelCoverage {
   float area = 0;  // in [0, 1]
   uint64_t samples = 0;
   PICTURA_HD bool is_full() const { return area == 1.0f && samples == kAllSamples; }
 };
 
-/// Samples of a coverage. A sliver (a polygon that covers an area but no sample) counts as covering all samples, so
-/// that it overlaps every other polygon.
+/// Samples of a coverage; all samples for a sliver, which covers an area but no sample.
 PICTURA_HD inline uint64_t effective_samples(const PixelCoverage& coverage) {
   return coverage.samples != 0 ? coverage.samples : kAllSamples;
 }
 
-/// Tolerance of full coverage: a pixel is fully covered if all samples are covered and the area is above 1 -
-/// kFullCoverage.
+/// Tolerance of the area of a fully covered pixel.
 constexpr float kFullCoverage = 1e-3f;
-/// Makes a coverage from samples and from an area that was summed over a polygon's edges.
+/// Makes a coverage from samples and the sum of area_of() over a polygon's edges.
 PICTURA_HD inline PixelCoverage rounded_coverage(float area, uint64_t samples) {
   if (samples == kAllSamples && area > 1.0f - kFullCoverage) return {1.0f, kAllSamples};
   return {min_of(area, 1.0f), samples};
 }
 
-/// Heights at which an edge's line crosses the left and right sides of a pixel, in pixels from the pixel's top.
+/// Heights of an edge's line at both sides of a pixel, in pixels from the pixel's top.
 struct EdgeCrossing {
   float left = 0, right = 0;
 };
-/// Crossing of an edge's line and a pixel. (left_px, top_px) is the pixel's top left corner relative to the edge's
-/// upper end.
+/// (left_px, top_px) is the pixel's top left corner relative to the edge's upper end.
 PICTURA_HD inline EdgeCrossing edge_crossing(const PolygonEdge& edge, float left_px, float top_px) {
   const float left = left_px * edge.dy_dx - top_px;
   return {left, left + edge.dy_dx};
 }
 
-/// For each column of samples, the range of heights (in units of kRowUnits per row) that is inside all edges so far.
+/// For each column, the range of heights (kRowUnits per row) inside all edges so far.
 struct SampleRange {
   Int16x8 low, high;
 };
@@ -69,16 +64,16 @@ PICTURA_HD inline SampleRange whole_range() {
   return {make_int16x8([](int) { return -kFar_units; }), make_int16x8([](int) { return kFar_units; })};
 }
 
-/// Summand that moves a height, as a fraction of kLines_rows (edges.h), to the lowest bits of a float's mantissa.
-constexpr float kToLowestBits = 1 << 8;  // the sum's lowest mantissa bit is 1 / (kLines_rows * kRowUnits)
-/// For each column, the difference between an edge's height in that column and its height in the first column right of
-/// the pixel's centre, minus 2^14. With kToLowestBits, the pixel's centre has height 2^14; subtracting 2^14 moves the
-/// centre to 0.
+/// Summand that moves a height to the lowest bits of a float's mantissa. Heights are fractions of kLines_rows
+/// (edges.h).
+constexpr float kToLowestBits = 1 << 8;  // the lowest bit is 1 / (kLines_rows * kRowUnits)
+/// For each column, the difference between an edge's heights there and in the first column right of the pixel's centre,
+/// minus 2^14. With kToLowestBits, the centre has height 2^14.
 PICTURA_HD inline Int16x8 column_heights(const PolygonEdge& edge) {
   return arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
 }
 
-/// Clips the range of each column to the inner side of an edge.
+/// Clips each column's range to the inner side of an edge.
 PICTURA_HD inline void narrow(const PolygonEdge& edge, const EdgeCrossing& crossing, SampleRange* range_inout) {
   constexpr uint32_t kLowest = 0, kHighest = 0x80008000u;
   const float at = saturate((crossing.left + crossing.right) * fabsf(edge.rows_scale) + edge.rows_offset);
@@ -89,8 +84,8 @@ PICTURA_HD inline void narrow(const PolygonEdge& edge, const EdgeCrossing& cross
   range_inout->high = add_min(columns, is_below ? kHighest : height, range_inout->high);
 }
 
-/// Offset for each column. A height plus its column's offset, rounded down to whole rows, is the number of samples
-/// above that height.
+/// Offset of each column. A height plus the offset, rounded down to whole rows, is the number of samples above the
+/// height.
 PICTURA_HD inline Int16x8 offsets_from_top() {
   return make_int16x8([](int column) {
     return kSampleRows / 2 * kRowUnits + kRowUnits - 1 -
@@ -98,39 +93,33 @@ PICTURA_HD inline Int16x8 offsets_from_top() {
   });
 }
 
-/// Mask of the samples within a range.
 PICTURA_HD inline uint64_t samples_within(const SampleRange& range) {
   const Int16x8 from_top = offsets_from_top();
   const Int16x8 to = add_clamp(range.high, from_top, make_int16x8([](int) { return kSampleRows * kRowUnits; }));
   return bits_between(add_clamp(range.low, from_top, to), to);
 }
 
-/// Mask of the samples on the inner side of an edge. (left_px, top_px) is the pixel's top left corner relative to the
-/// edge's upper end.
+/// Samples on the inner side of an edge. See edge_crossing() for (left_px, top_px).
 PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px, float top_px) {
   SampleRange range = whole_range();
   narrow(edge, edge_crossing(edge, left_px, top_px), &range);
   return samples_within(range);
 }
 
-/// Contribution of an edge to a polygon's area in a pixel. An edge on the polygon's right adds the area left of the
-/// edge, within the rows that the edge spans. An edge on the polygon's left subtracts that area. Both omit a term that
-/// cancels in the sum over a closed polygon.
+/// An edge's contribution to a polygon's area in a pixel. An edge on the polygon's right adds the area left of the
+/// edge, and an edge on the left subtracts it. A term that cancels over a closed polygon is omitted.
 PICTURA_HD inline float area_of(const PolygonEdge& edge, const EdgeCrossing& crossing, float y_px) {
   const float from = saturate(edge.y0 - y_px), to = saturate(edge.y1 - y_px);
-  // Between the heights `left` and `right`, the edge is within the pixel's width. Beyond `right`, the pixel's whole
-  // width is to the left of the edge.
+  // Between these heights, the edge is within the pixel's width. Beyond `right`, the whole width is left of the edge.
   const float left = max_no_nan(min_no_nan(crossing.left, to), from);
   const float right = max_no_nan(min_no_nan(crossing.right, to), from);
-  // Mean width of the area to the left of the edge, as a share of the pixel's width. It equals the line's x midway
-  // between both heights.
+  // Mean width of the area left of the edge.
   const float width = saturate(((left + right) - (crossing.left + crossing.right)) * edge.half_dx_dy + 0.5f);
   const float area = (right - left) * width + ((edge.dy_dx > 0.0f ? to : from) - right);
   return edge.rows_scale > 0.0f ? area : -area;
 }
 
-/// Coverage of pixel (x, y) by a convex polygon; empty if the area is below min_area. Edges that do not cross the pixel
-/// need no special case: they keep all samples or none, and add their part of the area.
+/// Coverage of pixel (x, y) by a convex polygon; empty if the area is below min_area.
 PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int count, float min_area, int x, int y) {
   const float x_px = no_rematerialize(static_cast<float>(x)), y_px = no_rematerialize(static_cast<float>(y));
   float area = 0.0f;
@@ -144,12 +133,12 @@ PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int cou
   return rounded_coverage(area, samples_within(range));
 }
 
-/// Range of the pixels of a row that a polygon may touch, and range of the pixels that the polygon covers fully.
+/// Pixels of a row that a polygon may touch, and pixels that it covers fully.
 struct RowSpan {
   int32_t begin = 0, end = 0, full_begin = 0, full_end = 0;
 };
 
-/// Margin at the borders of spans, where the exact tests of pixel_coverage() decide.
+/// Margin at the ends of spans, within which pixel_coverage() decides.
 constexpr float kSpanLeeway_px = 1e-3f;
 
 PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const PixelBox& box, int y) {
@@ -160,14 +149,13 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
   for_each_edge(edges, count, [&](const PolygonEdge& edge) {
     const float side = side_of(edge);
     if (side == 0.0f) {
-      // Level edge: the row is on one side of it, or contains it.
+      // Level edge.
       const float inner_px = edge.rows_scale > 0.0f ? y_px - edge.y0 : edge.y0 - (y_px + 1.0f);
       if (inner_px <= -1.0f) is_outside = true;
       if (inner_px < 0.0f) full_high = -1.0f;
       return;
     }
-    // `middle` is the x at which the edge's line crosses the row's centre; `reach` is half of the line's range of x
-    // within the row.
+    // `middle` is the line's x at the row's centre. `reach` is half of the line's range of x within the row.
     const float twice_above_px = 2.0f * (middle_px - edge.y0), middle = edge.x0 + twice_above_px * edge.half_dx_dy;
     const float reach = fabsf(edge.half_dx_dy), low = middle - reach, high = middle + reach;
     if (side < 0.0f) {

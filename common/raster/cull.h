@@ -1,6 +1,4 @@
-// Culling: selection of the primitives that an image may show. These touch the camera's frustum within the visible
-// range, and are not agents that the view excludes. The uniform grids find strips and walls. Shared by host and CUDA
-// code.
+// Culling: selection of the primitives that an image may show. For host and CUDA code.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -11,7 +9,7 @@ namespace pictura {
 
 PICTURA_HD inline Vec3 strip_middle(const Strip& strip) { return (strip.a_m + strip.b_m) * 0.5f; }
 
-/// Upper bound of a strip's radius, from its length, mitres and width.
+/// Upper bound of a strip's radius.
 PICTURA_HD inline float strip_radius_m(const Strip& strip) {
   const float side = max_of(length(strip.side_a), length(strip.side_b));
   return 0.5f * (length(strip.b_m - strip.a_m) + side * strip.width_m);
@@ -25,7 +23,7 @@ PICTURA_HD inline float wall_radius_m(const WallFace& wall) {
   return 0.5f * (length(wall.b_m - wall.a_m) + wall.height_m);
 }
 
-/// Slightly more than the radius of the disk, because the disk is drawn as a polygon of equal area.
+/// Bounding radius of a light's disk, which is drawn as a polygon of equal area.
 constexpr float kHeadRadius_m = 1.1f * kLightRadius_m;
 
 PICTURA_HD inline Vec3 box_middle(const AgentBox& box) { return box.center_m + Vec3{0.0f, 0.0f, 0.5f * box.height_m}; }
@@ -35,7 +33,7 @@ PICTURA_HD inline float box_radius_m(const AgentBox& box) {
 }
 
 PICTURA_HD inline bool may_be_visible(const Strip& strip, const PinholeCamera& camera, const Frustum& f) {
-  // The minimum width on screen widens a strip by less than the guard band, which the frustum includes.
+  // Widening stays within the guard band.
   return sphere_in_frustum(f, to_camera(camera, strip_middle(strip)), strip_radius_m(strip));
 }
 
@@ -51,7 +49,7 @@ PICTURA_HD inline bool may_be_visible(const AgentBox& box, const PinholeCamera& 
   return box.drawn != 0 && sphere_in_frustum(f, to_camera(camera, box_middle(box)), box_radius_m(box));
 }
 
-/// Whether a view excludes an agent: the view's own ego, a hidden agent, or any agent if the view hides all.
+/// Whether a view's images omit an agent.
 PICTURA_HD inline bool is_excluded(const View& view, Span<const int32_t> hidden_agents, int32_t agent) {
   if (agent == view.ego_agent || (view.hides & kHidesAgents) != 0) return true;
   for (int32_t i = view.hidden_begin; i < view.hidden_end; ++i) {
@@ -60,8 +58,8 @@ PICTURA_HD inline bool is_excluded(const View& view, Span<const int32_t> hidden_
   return false;
 }
 
-/// Calls visit(item) once for each item in those cells of a grid that a box on the ground touches. box_of(item) must be
-/// the box with which the grid was built.
+/// Calls visit(item) once for each item in the cells that a box touches. box_of(item) must be the item's box in the
+/// grid.
 template <typename BoxOf, typename Visit>
 PICTURA_HD inline void for_each_item(const GridView& grid, const Aabb2& query_box, BoxOf&& box_of, Visit&& visit) {
   const CellRange cells = cells_of(grid, query_box);

@@ -1,4 +1,4 @@
-// Edges of convex polygons on screen, precomputed for coverage. Shared by host and CUDA code.
+// Edges of convex polygons on screen, precomputed for coverage. For host and CUDA code.
 #pragma once
 
 #include "pictura/common/math.h"
@@ -7,22 +7,22 @@
 
 namespace pictura {
 
-/// An edge of a polygon on screen. Apart from the sign of rows_scale, its members do not depend on the edge's
-/// direction. So two faces that share an edge split areas and samples exactly.
+/// An edge of a polygon on screen. Only the sign of rows_scale depends on the edge's direction. So two faces with a
+/// common edge split areas and samples exactly.
 struct alignas(16) PolygonEdge {
-  float x0 = 0, y0 = 0;  // the upper end
-  float half_dx_dy = 0;  // half of dx/dy of the line; 0 for level edges
-  // Together with rows_offset and rows_step, rows_scale maps the line to sample heights (see make_edge()). It is
-  // negative if the face is above the edge. row_span() reads only this member and the members before it.
+  float x0 = 0, y0 = 0;  // upper end
+  float half_dx_dy = 0;  // 0 for level edges
+  // Maps the line to sample heights, with rows_offset and rows_step. Negative if the face is above the edge. row_span()
+  // reads no later member.
   float rows_scale = 0;
-  float y1 = 0;     // the lower end's y; equal to y0 for level edges, which bound no area
-  float dy_dx = 0;  // dy/dx of the line; 0 for level edges
+  float y1 = 0;     // lower end; y0 for level edges
+  float dy_dx = 0;  // 0 for level edges
   float rows_offset = 0;
   int32_t rows_step = 0;
 };
 
-/// Calls visit(edge) for the edges of a polygon. Loads each edge while the previous edge is visited. Two variables
-/// alternate, so that no edge is copied.
+/// Calls visit(edge) for each edge, and loads the next edge during the visit. Two variables alternate, so that no edge
+/// is copied.
 template <typename Visit>
 PICTURA_HD inline void for_each_edge(const PolygonEdge* edges, int count, Visit&& visit) {
   PolygonEdge even = edges[0], odd;
@@ -37,16 +37,14 @@ PICTURA_HD inline void for_each_edge(const PolygonEdge* edges, int count, Visit&
   }
 }
 
-/// Edges whose ends differ by less than kLevel_px in y are level and bound no area. Edges whose ends differ by less
-/// than kUpright_px in x are changed so that x differs by kUpright_px.
+/// An edge is level, and bounds no area, if its ends differ by less than kLevel_px in y. Smaller differences than
+/// kUpright_px in x are increased to kUpright_px.
 constexpr float kLevel_px = 1e-6f, kUpright_px = 1e-6f;
-/// Columns and rows of a pixel's sample grid.
 constexpr int kSampleColumns = kInt16x8Size, kSampleRows = 8;
-/// Sample tests use heights as 16-bit integers, kRowUnits per row, relative to the pixel's centre. In the first column
-/// right of the centre, a line's height is clamped to +-kLines_rows / 2; per column, it changes by at most kSteepest
-/// rows. So a clamped line does not cross the pixel, and 16 bits do not overflow. Steeper lines get the slope
-/// kSteepest, so that they cross the pixel's 8 rows within the width of one column. An upright line would otherwise
-/// include all samples of a column or none, which would quantize areas to eighths of the pixel.
+/// Sample tests use 16-bit heights, kRowUnits per row, relative to the pixel's centre. Heights are clamped to
+/// +-kLines_rows / 2 in the first column right of the centre. They change by at most kSteepest rows per column, so 16
+/// bits do not overflow. Steeper lines get this slope. Otherwise, upright lines would quantize areas to eighths of the
+/// pixel.
 constexpr int kRowUnits = 128;
 constexpr float kLines_rows = 256.0f, kSteepest = 9.0f;
 
@@ -62,30 +60,27 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   edge.y1 = is_level ? upper.y : lower.y;
   edge.dy_dx = dy * reciprocal_in_range(dx);
   edge.half_dx_dy = 0.5f * dx_dy;
-  // For lines steeper than kSteepest, one factor scales down all heights relative to the pixel's centre. The line still
-  // crosses the height of the centre at the same x.
+  // Reduces the slope of steep lines. They still cross the height of the pixel's centre at the same x.
   const float shrink = is_level ? 1.0f : min_of(kSteepest * fabsf(dx_dy), 1.0f);
   const float scale = shrink * (0.5f * kSampleRows / kLines_rows), step_rows = shrink * edge.dy_dx;
-  // From the sum of the line's heights at the pixel's left and right sides, rows_scale and rows_offset give the line's
-  // height in the first column right of the centre, as a fraction of kLines_rows; 0.5 is the pixel's centre. The
-  // heights at the sides are in pixels from the pixel's top.
+  // rows_scale and rows_offset map the sum of the line's heights at both sides of the pixel. The result is the height
+  // in the first column right of the centre, as a fraction of kLines_rows. 0.5 is the pixel's centre.
   edge.rows_scale = (dx > 0.0f) == downward ? scale : -scale;
   edge.rows_offset = 0.5f - scale + step_rows * (0.5f / kLines_rows);
   edge.rows_step = static_cast<int32_t>(floorf(step_rows * kRowUnits + 0.5f));
   return edge;
 }
 
-/// Positive if the face is to the left of an edge, negative if it is to the right, 0 for level edges.
+/// Positive if the face is left of the edge, negative if right, 0 for level edges.
 PICTURA_HD inline float side_of(const PolygonEdge& edge) { return edge.rows_scale * edge.half_dx_dy; }
 
-/// Whether a point is on an edge's line or on the inner side of the line.
+/// Whether a point is on the line of an edge or on its inner side.
 PICTURA_HD inline bool is_inside(const PolygonEdge& edge, Vec2 p) {
   const float below_px = (p.y - edge.y0) - (p.x - edge.x0) * edge.dy_dx;
   return (edge.rows_scale > 0.0f ? below_px : -below_px) >= 0.0f;
 }
 
-/// Calls store_edge(i, edge) with i = 0, 1, ... for the edges of a polygon on screen, except for edges of length 0.
-/// Returns the number of edges, at most `count`.
+/// Calls store_edge(i, edge) for each edge of positive length. Returns the number of edges.
 template <typename StoreEdge>
 PICTURA_HD inline int make_edges(const Vec2* corner, int count, bool is_clockwise, StoreEdge&& store_edge) {
   int edges = 0;

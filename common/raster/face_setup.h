@@ -1,5 +1,4 @@
-// Face set-up: conversion of a primitive to its faces on screen. Shared by host and CUDA code, which distribute the
-// work and store the results differently.
+// Face set-up: conversion of a primitive to faces on screen. For host and CUDA code.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -20,7 +19,7 @@ struct ImageSetting {
   Occluders occluders;
 };
 
-/// The primitive that a face belongs to: its object id and its value in the class plane.
+/// Object id and class of a face's primitive.
 struct PrimitiveRef {
   uint32_t object_id = 0;
   uint8_t class_id = 0;
@@ -44,9 +43,8 @@ PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
   return static_cast<uint16_t>(kind_of(face.object_id) == kAgentKind ? 1 + index_of(face.object_id) : 0);
 }
 
-/// Minimum covered area of a pixel: smaller areas and smaller faces are ignored. Strips rarely occlude anything except
-/// each other, so their minimum is higher: an area that adds less than kMinWeight to every channel is ignored. The
-/// minimum of a strip is at most kMaxSparedArea, because dark strips may occlude bright strips.
+/// Minimum area of a face in a pixel. A strip is ignored where it adds less than kMinWeight to every channel. A strip's
+/// minimum is at most kMaxSparedArea, because dark strips may occlude bright strips.
 constexpr float kMinArea = 1e-4f, kMinWeight = 2.0f / 255.0f, kMaxSparedArea = 0.125f;
 PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
   if (kind_of(primitive.object_id) != kStripKind) return kMinArea;
@@ -54,18 +52,18 @@ PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
   return kMinWeight * reciprocal_in_range(max_of(brightest, kMinWeight / kMaxSparedArea));
 }
 
-/// Whether a face that needs no clipping is large enough and not behind an occluder. Sets the winding of the face.
+/// Whether an unclipped face is large enough and not behind an occluder. Sets the winding.
 PICTURA_HD inline bool is_quad_visible(const ImageSetting& setting, const ScreenQuad& quad, const FacePlane& plane,
                                        Rgb color, PrimitiveRef primitive, bool* is_clockwise_out) {
   ScreenBounds bounds = quad.bounds;
-  if (kind_of(primitive.object_id) == kStripKind && plane.offset > 0.0f) {  // the strip is seen from below
+  if (kind_of(primitive.object_id) == kStripKind && plane.offset > 0.0f) {  // seen from below
     bounds.inverse_depth_high *= nearest_standing(plane_distance_m(plane));
   }
   return find_winding(quad, 2.0f * min_area_of(color, primitive), is_clockwise_out) &&
          !setting.occluders.occludes(setting.camera, bounds);
 }
 
-/// Completes a face of make_screen_face() or make_quad_face(): sets the members that depend on its primitive.
+/// Sets the members of a face that depend on its primitive.
 PICTURA_HD inline ScreenFace complete_face(const ScreenFace& face, PrimitiveRef primitive, int32_t edge_begin) {
   ScreenFace whole = face;
   if (kind_of(primitive.object_id) == kStripKind) {
@@ -84,9 +82,8 @@ PICTURA_HD inline ScreenFace complete_face(const ScreenFace& face, PrimitiveRef 
   return whole;
 }
 
-/// Clips and projects a face, and stores its edges in a pool. pool.take(count) reserves edges and returns the index of
-/// the first edge, or -1 if the pool is full; pool.put(index, edge) stores an edge. Returns false if no part of the
-/// face is in the image or the pool is full.
+/// Clips and projects a face, and stores its edges. pool.take(count) reserves edges and returns the first index, or -1
+/// if the pool is full. pool.put(index, edge) stores an edge. Returns false if nothing is visible or the pool is full.
 template <typename EdgePool>
 PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primitive, const CameraFace& face,
                                  EdgePool& pool, ScreenFace* face_out) {
@@ -122,10 +119,9 @@ PICTURA_HD inline bool make_face(const ImageSetting& setting, PrimitiveRef primi
   return true;
 }
 
-/// The front surface at a screen point. Faces that cover the point are added in any order; front() returns the face in
-/// front of all others, or null. Among equally near solids (faces that are not strips), and among strips on the level
-/// of the nearest strip, the face with the lowest object id is in front. is_in_front() compares the remaining solid
-/// with the remaining strip.
+/// The front surface at a screen point. Faces that cover the point are added in any order. front() returns the front
+/// face, or null. Solids are faces that are not strips. Among equally near solids, and among strips on one level, the
+/// lowest object id is in front. is_in_front() then compares the solid with the strip.
 class FrontFace {
  public:
   PICTURA_HD void add(const ScreenFace& face, Vec2 at_px) {
@@ -135,7 +131,7 @@ class FrontFace {
     if (!before || nearer(face, *before, at_px)) best = &face;
     needs_second_pass_ = needs_second_pass_ || (before && (is_of_strip || are_equally_near(face, *before, at_px)));
   }
-  /// Whether all faces must be added a second time, because several may be on one level or equally near.
+  /// Whether all faces must be added again, because several may be on one level or equally near.
   PICTURA_HD bool needs_second_pass() const { return needs_second_pass_; }
   PICTURA_HD void add_second_pass(const ScreenFace& face, Vec2 at_px) {
     if (is_strip(face)) {
@@ -164,8 +160,8 @@ class FrontFace {
     return are_equal_depths(clamped_inverse_depth(a, at_px), clamped_inverse_depth(b, at_px));
   }
   const ScreenFace *solid_ = nullptr, *strip_ = nullptr;  // nearest solid and nearest strip
-  const ScreenFace* first_solid_ = nullptr;               // lowest object id among the equally near solids
-  const ScreenFace* painted_ = nullptr;  // strip with the lowest rank on the level of the nearest strip
+  const ScreenFace* first_solid_ = nullptr;               // lowest object id of equally near solids
+  const ScreenFace* painted_ = nullptr;                   // lowest object id on the level of strip_
   bool needs_second_pass_ = false;
 };
 

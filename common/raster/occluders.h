@@ -1,5 +1,4 @@
-// Occlusion culling: the walls and box sides that cover most of an image are its occluders. A face that is behind an
-// occluder, in depth and on screen, is not drawn. Shared by host and CUDA code.
+// Occlusion culling: faces behind an occluder are not drawn. For host and CUDA code.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -8,13 +7,13 @@
 
 namespace pictura {
 
-/// The face of a wall or box on screen, entirely beyond the near plane. Aligned for wide loads.
+/// Face of a wall or box on screen, in front of the near plane.
 struct alignas(16) Occluder {
   Vec3 side[4];        // distance in px from each side, positive inside: factors of x and y, constant term
-  Vec3 inverse_depth;  // inverse depth of the occluder's plane: factors of x and y, constant term
+  Vec3 inverse_depth;  // factors of x and y, constant term
 };
 
-/// Maximum depth of occluders: a wall or box further away is not considered.
+/// Maximum depth of occluders.
 constexpr float kOccluderRange_m = 45.0f;
 PICTURA_HD inline bool may_occlude(const AgentBox& box, const PinholeCamera& camera) {
   return to_camera(camera, box.center_m).z - 0.5f * box.length_m < kOccluderRange_m;
@@ -23,17 +22,15 @@ PICTURA_HD inline bool may_occlude(const WallFace& wall, const PinholeCamera& ca
   return to_camera(camera, wall_middle(wall)).z - wall_radius_m(wall) < kOccluderRange_m;
 }
 
-/// Twice the minimum area of an occluder, and the minimum length by which the normals of its sides are divided.
+/// Twice the minimum area of an occluder, and the minimum divisor of its sides' normals.
 constexpr float kMinOccluder_px2 = 1.0f, kMinSide_px = 1e-3f;
-/// Maximum distance of an occluder's corners from the image; beyond it, precision is too low.
+/// Maximum distance of an occluder's corners from the image, for precision.
 constexpr float kMaxOccluder_px = 4096.0f;
-/// Margins of occlusion tests, so that rounding never hides a visible face. An occluded face is inside the sides of the
-/// occluder by at least kOccluderMargin_px, and its depth is at least kOccluderDepthFactor times the depth of the
-/// occluder's plane.
+/// Margins against rounding: minimum distance from the occluder's sides, and minimum ratio of depths.
 constexpr float kOccluderMargin_px = 0.05f, kOccluderDepthFactor = 1.002f;
 
-/// Area, within the image, of the bounding box of a wall's or a box's face. Occluders are chosen by this area. Returns
-/// 0 if the face cannot occlude; otherwise sets the face on screen and its winding.
+/// Area of a face's bounding box within the image, by which occluders are chosen. Returns 0 if the face cannot occlude.
+/// Otherwise sets the face on screen and its winding.
 PICTURA_HD inline float occluder_area_px2(const PinholeCamera& camera, const CameraQuad& face, ScreenQuad* quad_out,
                                           bool* is_clockwise_out) {
   const float nearest_m =
@@ -59,17 +56,16 @@ PICTURA_HD inline Occluder make_occluder(const PinholeCamera& camera, const Frus
   return occluder;
 }
 
-/// The occluders of an image: the faces of largest area. Among faces of equal area, those with the lowest face_entry()
-/// are chosen.
+/// The occluders of an image: the faces of largest area. Among equals, the lowest face_entry() is chosen.
 struct Occluders {
   static constexpr int kMaxCount = 4;
   int32_t count = 0;
   Occluder occluder[kMaxCount];
 
-  /// Whether one occluder hides the part of a face's bounds that is in the image.
+  /// Whether one occluder hides a face with these bounds.
   PICTURA_HD bool occludes(const PinholeCamera& camera, const ScreenBounds& bounds) const {
     const Aabb2 box = bounds.in_image(camera);
-    // Minimum, over the box, of a linear function of the screen.
+    // Minimum of a linear function over the box.
     auto min_over_box = [&](Vec3 of) {
       return of.x * (of.x > 0.0f ? box.low.x : box.high.x) + of.y * (of.y > 0.0f ? box.low.y : box.high.y) + of.z;
     };

@@ -1,5 +1,4 @@
-// Conversion of a face in camera coordinates to a polygon on screen: projection, bounds, and the inverse depth of its
-// plane. Shared by host and CUDA code.
+// Conversion of a face in camera coordinates to a polygon on screen. For host and CUDA code.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -15,29 +14,29 @@ PICTURA_HD inline Vec2 project(const PinholeCamera& camera, Vec3 p, float invers
           camera.center_y_px + camera.focal_y_px * (p.y * inverse_depth)};
 }
 
-/// Pixels that a polygon may touch, as half-open ranges within the image.
+/// Pixels that a polygon may touch, as half-open ranges.
 struct PixelBox {
   int16_t x_begin = 0, x_end = 0, y_begin = 0, y_end = 0;
 };
 
-/// A convex polygon on screen, whose edges are stored in a pool. The members are in the order in which they are read.
+/// A convex polygon on screen, with edges in a pool.
 struct alignas(16) ScreenFace {
   PixelBox box;
   int32_t edge_begin = 0;
   uint8_t edge_count = 0;
-  uint8_t class_id = 0;         // value of the class plane
+  uint8_t class_id = 0;
   uint16_t min_area_units = 0;  // see min_area()
-  // Inverse depth at screen point (x, y): inverse_depth_x * x + inverse_depth_y * y + inverse_depth_0.
+  // Inverse depth at a screen point: factors of x and y, and constant term.
   float inverse_depth_x = 0, inverse_depth_y = 0, inverse_depth_0 = 0;
-  uint32_t object_id = 0;  // id of the face's primitive, see common/raster/visibility.h
-  // Range of the inverse depth over the face's corners, widened by kWidenedDepth if the face is a strip.
+  uint32_t object_id = 0;  // see visibility.h
+  // Range of the inverse depth over the corners, widened by kWidenedDepth for strips.
   float inverse_depth_low = 0, inverse_depth_high = 0;
-  float nearest_standing = 1;  // see nearest_standing(); 1 except for strips that are seen from below
-  float plane_distance_m = 0;  // strips: height of the strip's plane above the camera, along the normal; other faces: 0
+  float nearest_standing = 1;  // 1 except for strips seen from below
+  float plane_distance_m = 0;  // height of a strip's plane above the camera; 0 for other faces
   Rgb color;
-  uint32_t color_bytes = 0;  // to_bytes(color), for CUDA code
+  uint32_t color_bytes = 0;  // to_bytes(color)
 
-  /// If the face covers less of a pixel than this area (px^2), the pixel ignores it; see min_area_of().
+  /// Minimum covered area of a pixel, in px^2. Pixels ignore the face below this area.
   PICTURA_HD float min_area() const { return static_cast<float>(min_area_units) * (1.0f / kAreaUnits); }
   PICTURA_HD void set_min_area(float area) { min_area_units = static_cast<uint16_t>(area * kAreaUnits + 0.5f); }
 
@@ -61,20 +60,18 @@ struct ScreenBounds {
     return low.x >= -margin_px && low.y >= -margin_px && high.x <= static_cast<float>(camera.width_px) + margin_px &&
            high.y <= static_cast<float>(camera.height_px) + margin_px;
   }
-  /// Intersection of the bounds with the image.
   PICTURA_HD Aabb2 in_image(const PinholeCamera& camera) const {
     return {{max_no_nan(low.x, 0.0f), max_no_nan(low.y, 0.0f)},
             {min_no_nan(high.x, static_cast<float>(camera.width_px)),
              min_no_nan(high.y, static_cast<float>(camera.height_px))}};
   }
-  /// Whether the polygon may touch pixels of an image.
   PICTURA_HD bool meet_image(const PinholeCamera& camera) const {
     return high.x >= 0.0f && high.y >= 0.0f && low.x < static_cast<float>(camera.width_px) &&
            low.y < static_cast<float>(camera.height_px);
   }
 };
 
-/// The pixels that a polygon may touch. The polygon's bounds must overlap the image and be within the guard band.
+/// The bounds must overlap the image and be within the guard band.
 PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, const ScreenBounds& bounds) {
   auto pixel_of = [](float at) { return static_cast<int>(floorf(at)); };
   return {static_cast<int16_t>(max_of(pixel_of(bounds.low.x), 0)),
@@ -83,29 +80,28 @@ PICTURA_HD inline PixelBox pixel_box(const PinholeCamera& camera, const ScreenBo
           static_cast<int16_t>(min_of(pixel_of(bounds.high.y) + 1, camera.height_px))};
 }
 
-/// Polygons whose area is less than half of this are dropped.
+/// Smaller polygons are dropped.
 constexpr float kMinTwiceArea_px2 = 1e-6f;
 
-/// Whether a plane has an inverse depth. The plane of a face without area, and a plane through the camera, have none.
+/// False for faces without area and for planes through the camera.
 PICTURA_HD inline bool has_inverse_depth(const FacePlane& plane) {
   constexpr float kMinMagnitude = 1e-30f;
   return dot(plane.normal, plane.normal) > kMinMagnitude && fabsf(plane.offset) > kMinMagnitude;
 }
-/// Inverse depth of a plane as a linear function of the screen: factors of x and y, and a constant term. On the plane,
-/// normal . p = offset and p = depth * ray, so the inverse depth is linear in the ray.
+/// Inverse depth of a plane: factors of x and y on screen, and constant term.
 PICTURA_HD inline Vec3 inverse_depth_plane(const PinholeCamera& camera, const Frustum& f, const FacePlane& plane) {
   const Vec3 inverse = plane.normal * (has_inverse_depth(plane) ? reciprocal_in_range(plane.offset) : 0.0f);
   const float x = inverse.x * f.x_per_px, y = inverse.y * f.y_per_px;
   return {x, y, inverse.z - x * camera.center_x_px - y * camera.center_y_px};
 }
 
-/// Signed distance of a plane from the camera, along the plane's normal; 0 if the plane has no inverse depth.
+/// Signed distance of a plane from the camera along its normal; 0 if has_inverse_depth() is false.
 PICTURA_HD inline float plane_distance_m(const FacePlane& plane) {
   return has_inverse_depth(plane) ? plane.offset * reciprocal_in_range(sqrt_in_range(dot(plane.normal, plane.normal)))
                                   : 0.0f;
 }
 
-/// Sets the members of a face that depend on its plane and its bounds. The bounds must overlap the image.
+/// Sets members that depend on a face's plane and bounds. The bounds must overlap the image.
 PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f, const ScreenBounds& bounds,
                                   const FacePlane& plane, ScreenFace* face_out) {
   face_out->box = pixel_box(camera, bounds);
@@ -118,9 +114,8 @@ PICTURA_HD inline void set_bounds(const PinholeCamera& camera, const Frustum& f,
   face_out->plane_distance_m = plane_distance_m(plane);
 }
 
-/// Projects a clipped face (camera coordinates) of at most kMaxCorners corners; `plane` is the plane of the face. Calls
-/// store_edge as make_edges() does. Sets all members of face_out except those that only complete_face() sets. Returns
-/// false if the face covers nothing.
+/// Projects a clipped face. complete_face() sets the remaining members of face_out. Returns false if the face covers
+/// nothing. See make_edges() for store_edge.
 template <int kMaxCorners, typename Corners, typename StoreEdge>
 PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frustum& f, const Corners& polygon,
                                         int count, const FacePlane& plane, Rgb color, StoreEdge&& store_edge,
@@ -145,18 +140,15 @@ PICTURA_HD inline bool make_screen_face(const PinholeCamera& camera, const Frust
   return true;
 }
 
-/// A face of four corners on screen.
 struct ScreenQuad {
   Vec2 corner[4];
   ScreenBounds bounds;
 };
 
-/// Position of a face relative to the image and its guard band: outside the image (dropped), inside (drawn unchanged),
-/// or crossing (clipped first).
+/// Position of a face: outside the image, inside the guard band (drawn unchanged), or crossing it (clipped).
 enum class ClipClass : uint8_t { outside, inside, crossing };
 
-/// Projects a face of four corners, and widens strips to at least floor_px on screen. So strips that need no clipping
-/// are never widened in camera coordinates.
+/// Projects a face of four corners, and widens strips to at least floor_px on screen.
 PICTURA_HD inline ClipClass project_quad(const PinholeCamera& camera, const Vec3* corners, float floor_px,
                                          ScreenQuad* quad_out) {
   const float nearest_m = min_no_nan(min_no_nan(corners[0].z, corners[1].z), min_no_nan(corners[2].z, corners[3].z));
@@ -178,21 +170,20 @@ PICTURA_HD inline ClipClass project_quad(const PinholeCamera& camera, const Vec3
   *bounds = {};
   for (int i = 0; i < 4; ++i) bounds->add(corner[i], inverse_depth[i]);
   const bool is_inside_guard_band = bounds->are_within(camera, kGuardBand_px);
-  // For faces that extend behind the near plane, the values computed above are meaningless.
+  // These values are meaningless for a face that extends behind the near plane.
   if (nearest_m < kNear_m) return ClipClass::crossing;
   return !bounds->meet_image(camera) ? ClipClass::outside
                                      : (is_inside_guard_band ? ClipClass::inside : ClipClass::crossing);
 }
 
-/// Sets a face's winding on screen; returns false if its area is too small.
+/// Sets the winding of a face. Returns false if its area is too small.
 PICTURA_HD inline bool find_winding(const ScreenQuad& quad, float min_twice_area_px2, bool* is_clockwise_out) {
   const float twice_area = cross(quad.corner[2] - quad.corner[0], quad.corner[3] - quad.corner[1]);
   *is_clockwise_out = twice_area > 0.0f;
   return fabsf(twice_area) >= min_twice_area_px2;
 }
 
-/// Variant of make_screen_face() for a quad for which project_quad() returned ClipClass::inside and find_winding()
-/// returned true.
+/// Variant of make_screen_face() for a quad that is inside the guard band and that find_winding() accepted.
 template <typename StoreEdge>
 PICTURA_HD inline void make_quad_face(const PinholeCamera& camera, const Frustum& f, const ScreenQuad& quad,
                                       bool is_clockwise, const FacePlane& plane, Rgb color, StoreEdge&& store_edge,
@@ -202,7 +193,7 @@ PICTURA_HD inline void make_quad_face(const PinholeCamera& camera, const Frustum
   set_bounds(camera, f, quad.bounds, plane, face_out);
 }
 
-/// 1 / depth of a face's plane at a screen point; negative if the plane is behind the camera there.
+/// 1 / depth of a face's plane; negative if the plane is behind the camera.
 PICTURA_HD inline float inverse_depth(const ScreenFace& face, Vec2 at_px) {
   return face.inverse_depth_0 + face.inverse_depth_x * at_px.x + face.inverse_depth_y * at_px.y;
 }

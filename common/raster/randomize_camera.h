@@ -1,7 +1,5 @@
-// Randomized cameras: rotation, shift and zoom of a view's camera, and changes to the colours of its image. All these
-// are functions of the view's key and the camera's index, so that an image that is drawn again has the same bits on
-// every device. Every random value is drawn even if its range is 0, so that the range of one effect does not change
-// other effects.
+// Randomized cameras and image colours: functions of the view's key and the camera's index, bitwise equal on all
+// devices. Values are drawn even if their range is 0, so that effects do not change each other.
 #pragma once
 
 #include "pictura/common/camera_randomization.h"
@@ -11,9 +9,9 @@
 
 namespace pictura {
 
-/// Random deviations of a camera for one episode.
+/// Random deviations of a camera in one episode.
 struct CameraMounting {
-  float yaw_rad = 0, pitch_rad = 0, roll_rad = 0;  // about the camera's own axes, with the signs of Camera's angles
+  float yaw_rad = 0, pitch_rad = 0, roll_rad = 0;  // about the camera's axes, see Camera
   Vec3 shift_m;                                    // in the ego frame
   float focal_factor = 1, brightness_factor = 1;
   bool is_dead = false;
@@ -46,7 +44,7 @@ PICTURA_HD inline CameraMounting draw_mounting(const CameraRandomization& ranges
   return mounting;
 }
 
-/// Returns a rig's camera with this mounting applied.
+/// Applies a mounting to a rig's camera.
 PICTURA_HD inline PinholeCamera mounted(PinholeCamera camera, const CameraMounting& mounting) {
   // Turns axis a towards axis b.
   auto turn = [](Vec3* a, Vec3* b, float angle_rad) {
@@ -64,14 +62,12 @@ PICTURA_HD inline PinholeCamera mounted(PinholeCamera camera, const CameraMounti
   return camera;
 }
 
-/// Returns the rig's camera of this index, in the ego frame, as randomized for a view's agent.
 PICTURA_HD inline PinholeCamera randomized_camera(const PinholeCamera& in_ego, const CameraRandomization& ranges,
                                                   const ViewKey& key, int camera) {
   return ranges.moves_cameras() ? mounted(in_ego, draw_mounting(ranges, key, camera)) : in_ego;
 }
 
-/// Effect on an image's colours: a factor, and noise per pixel and channel. Dropped images and images of dead cameras
-/// are black.
+/// Effect on an image's colours.
 struct ImageEffect {
   bool is_on = false;
   float brightness_factor = 1, noise_per_unit = 0;
@@ -79,7 +75,7 @@ struct ImageEffect {
 
   PICTURA_HD Rgb of(Rgb color, int x, int y) const {
     Philox4 random{};
-    if (noise_per_unit > 0) {  // the noise takes most of an effect's time
+    if (noise_per_unit > 0) {  // noise takes most of the time
       random = philox4x32_10({{static_cast<uint32_t>(x), static_cast<uint32_t>(y), 0, 0}}, noise_key[0], noise_key[1]);
     }
     auto channel = [&](float value, uint32_t bits) {
@@ -87,13 +83,12 @@ struct ImageEffect {
     };
     return {channel(color.r, random.word[0]), channel(color.g, random.word[1]), channel(color.b, random.word[2])};
   }
-  /// Applies the effect to a colour in the form of to_bytes().
+  /// Applies the effect to packed bytes, see to_bytes().
   PICTURA_HD uint32_t of_bytes(uint32_t color, int x, int y) const { return to_bytes(of(rgb_of_bytes(color), x, y)); }
 
-  /// Standard deviation of noise_units(), a sum of four bytes.
+  /// Standard deviation of noise_units().
   static constexpr float kNoiseDeviation = 147.8005413f;
-  /// Nearly normally distributed noise from integer operations alone: the sum of four uniform bytes minus the mean of
-  /// such sums.
+  /// Approximately normal noise: the sum of four uniform bytes, minus its mean.
   PICTURA_HD static constexpr int noise_units(uint32_t bits) {
     return static_cast<int>((bits & 255u) + (bits >> 8 & 255u) + (bits >> 16 & 255u) + (bits >> 24)) - 510;
   }

@@ -1,7 +1,6 @@
-// Visibility within a pixel. A fragment is the part of a pixel that one face covers. For each pair of fragments, the
-// functions below decide which samples one fragment hides from the other. The decision is made at the centroid of the
-// samples that both fragments cover: the face with the nearer plane is in front. So cyclic overlaps, slopes and
-// intersections need no order of whole primitives. Shared by host and CUDA code.
+// Visibility within a pixel, for host and CUDA code. A fragment is the part of a pixel that one face covers. For each
+// pair of fragments, functions decide which samples one hides from the other. The nearer plane at the centroid of the
+// shared samples is in front, so primitives need no order.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -10,8 +9,7 @@
 
 namespace pictura {
 
-// Object ids are unique within an image. The highest bits are the kind, the lowest bits the index. Strips also have
-// bits for their rank, above the index.
+// Object ids, unique within an image, contain from the highest bits: the kind, the rank (only strips), and the index.
 constexpr int kKindShift = 30, kRankShift = 28;
 constexpr uint32_t kAgentKind = 0, kWallKind = 1, kLightKind = 2, kStripKind = 3;
 constexpr uint32_t kIndexMask = (1u << kRankShift) - 1;
@@ -19,12 +17,12 @@ constexpr uint32_t kIndexMask = (1u << kRankShift) - 1;
 PICTURA_HD constexpr uint32_t make_object_id(uint32_t kind, int32_t index) {
   return (kind << kKindShift) | static_cast<uint32_t>(index);
 }
-/// Object id of a strip; `index` is its index in the geometry's strips.
+/// `index` is the strip's index in the geometry.
 PICTURA_HD inline uint32_t strip_object_id(const Strip& strip, int32_t index) {
   return (kStripKind << kKindShift) | (static_cast<uint32_t>(strip_rank(strip.kind)) << kRankShift) |
          static_cast<uint32_t>(index);
 }
-/// Entry of a list of visible faces: the object id, and in higher bits the number of an agent's face.
+/// Entry of a list of visible faces: the object id and, in higher bits, the number of an agent's face.
 constexpr int kFaceShift = 27;
 constexpr uint32_t kFaceIndexMask = (1u << kFaceShift) - 1;
 PICTURA_HD constexpr uint32_t face_entry(uint32_t object_id, int face) {
@@ -34,8 +32,8 @@ PICTURA_HD constexpr uint32_t kind_of(uint32_t object_id) { return object_id >> 
 PICTURA_HD constexpr int32_t index_of(uint32_t object_id) { return static_cast<int32_t>(object_id & kIndexMask); }
 PICTURA_HD constexpr bool is_strip(const ScreenFace& face) { return kind_of(face.object_id) == kStripKind; }
 
-/// Outline of a primitive on the ground plane: four corners, at the height of the primitive's lower end. If the outline
-/// is a line, each end occurs twice.
+/// Outline of a primitive on the ground plane, at the height of its lower end. If the outline is a line, each end
+/// occurs twice.
 struct Extent {
   Vec3 corner[4];
 };
@@ -58,7 +56,7 @@ PICTURA_HD inline Extent extent_of(const Strip& strip) {
   return extent;
 }
 
-/// Extent of a primitive, by its object id. `agents` points to the first agent of the world.
+/// `agents` points to the first agent of the world.
 PICTURA_HD inline Extent extent_of(uint32_t object_id, const StaticGeometryView& pieces, const AgentBox* agents) {
   const int32_t index = index_of(object_id);
   switch (kind_of(object_id)) {
@@ -69,8 +67,8 @@ PICTURA_HD inline Extent extent_of(uint32_t object_id, const StaticGeometryView&
   }
 }
 
-/// Corners on the ground plane. turn() shifts the corners cyclically, so that code visits all sides without an index.
-/// An index would force the corners into a CUDA thread's local memory.
+/// Corners on the ground plane. turn() replaces an index, which would force the corners into a CUDA thread's local
+/// memory.
 struct GroundQuad {
   Vec2 corner[4];
   PICTURA_HD void turn() {
@@ -85,7 +83,7 @@ PICTURA_HD inline GroundQuad ground_quad(const Extent& extent, Vec2 origin) {
   return quad;
 }
 
-/// Whether the first side of a separates a from b on the ground. Touching quads count as separated.
+/// Whether the first side of a separates a from b. Touching quads are separated.
 PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQuad& b) {
   constexpr float kTouching_m = 1e-3f;
   struct Interval {
@@ -102,16 +100,16 @@ PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQua
     return interval;
   };
   const Interval of_a = project(a), of_b = project(b);
-  // Displacement along the axis after which the quads would only touch, times the side's length. The displacement is
-  // positive even if one interval, that of a wall, is a point within the other interval.
+  // Displacement, times the side's length, after which the quads would only touch. Positive even if a wall's interval
+  // is a point within the other.
   const float overlap = min_no_nan(of_a.high - of_b.low, of_b.high - of_a.low);
   const float length2_m2 = dot(side, side);
   return length2_m2 > 1e-12f && (overlap <= 0.0f || overlap * overlap <= kTouching_m * kTouching_m * length2_m2);
 }
 
-/// Whether two extents overlap on the ground plane: no side of either extent separates them.
+/// Whether two extents overlap on the ground plane.
 PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
-  // Coordinates are relative to a nearby point, for precision.
+  // Relative to a nearby point, for precision.
   const Vec2 origin = a.corner[0].xy();
   GroundQuad one = ground_quad(a, origin), other = ground_quad(b, origin);
   PICTURA_NO_UNROLL
@@ -126,8 +124,8 @@ PICTURA_HD inline bool overlap_on_ground(const Extent& a, const Extent& b) {
   return true;
 }
 
-/// Whether a solid stands on a strip (see kStanding_m). Such a solid is above the strip: it is in front of the strip
-/// for a camera above, and behind the strip for a camera below.
+/// Whether a solid stands on a strip (see kStanding_m). The solid is in front of the strip for a camera above, and
+/// behind it for a camera below.
 PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
   Vec3 sum{};
   for (const Vec3 corner : solid.corner) sum = sum + (corner - strip.corner[0]);
@@ -136,34 +134,33 @@ PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
   return fabsf(dot(normal, middle)) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
 }
 
-/// Whether a face is a strip that is seen from below. Such a strip is in front of all solids that stand on it, even of
-/// nearer solids, because solids extend through the strip.
+/// Whether a face is a strip seen from below. It is in front of all solids that stand on it, because solids extend
+/// through the strip.
 PICTURA_HD inline bool is_strip_from_below(const ScreenFace& face) { return face.plane_distance_m > 0.0f; }
 
-/// Maximum ratio, on a ray from the camera, of a solid's inverse depth to that of the strip on which the solid stands.
-/// The camera is plane_distance_m below the strip's plane, and solids extend up to kThroughStrip_m below the plane. The
-/// ratio is infinite if the camera is within that distance, and 1 if the camera is above the plane.
+/// Maximum ratio, on a ray from the camera, of the inverse depths of a solid and of the strip on which it stands.
+/// Solids extend up to kThroughStrip_m below the strip. The ratio is infinite for a camera within this distance below
+/// the strip, and 1 for a camera above.
 PICTURA_HD inline float nearest_standing(float plane_distance_m) {
   if (!(plane_distance_m > 0.0f)) return 1.0f;
   return plane_distance_m > kThroughStrip_m ? plane_distance_m * reciprocal_in_range(plane_distance_m - kThroughStrip_m)
                                             : float_from_bits(0x7F800000u);
 }
 
-/// 1 / depth of a face at a screen point, clamped to the range of its corners. For strips, the range is widened by
-/// kWidenedDepth. Faces are compared by this value.
+/// 1 / depth of a face, clamped to the range of its corners, which is wider for strips. Faces are compared by this
+/// value.
 PICTURA_HD inline float clamped_inverse_depth(const ScreenFace& face, Vec2 at_px) {
   return clamp(inverse_depth(face, at_px), face.inverse_depth_low, face.inverse_depth_high);
 }
 
-/// Depth (camera z) of a face at a screen point, clamped to the range of its corners' depths.
+/// Depth of a face, clamped to the range of its corners.
 PICTURA_HD inline float face_depth_m(const ScreenFace& face, Vec2 at_px) {
   const float widened = is_strip(face) ? kWidenedDepth : 1.0f;
   return 1.0f / clamp(inverse_depth(face, at_px), face.inverse_depth_low * widened, face.inverse_depth_high / widened);
 }
 
-/// Whether two strips are on one level at a screen point: at the depth of the nearer strip, the heights of their planes
-/// differ by less than kSameLevel_m. Depths are clamped, because a widened strip may extend beyond the horizon of its
-/// plane.
+/// Whether two strips are on one level (see kSameLevel_m) at the depth of the nearer strip. The depth is clamped,
+/// because a widened strip may extend beyond the horizon of its plane.
 PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
   const float nearest = max_of(clamped_inverse_depth(a, at_px), clamped_inverse_depth(b, at_px));
   // Heights above the two planes, times the inverse depth.
@@ -172,13 +169,13 @@ PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Ve
   return fabsf(above_a - above_b) < kSameLevel_m * nearest;
 }
 
-/// Whether two inverse depths count as equal, see kEqualDepth.
+/// See kEqualDepth.
 PICTURA_HD inline bool are_equal_depths(float inverse_depth_a, float inverse_depth_b) {
   return fabsf(inverse_depth_a - inverse_depth_b) < kEqualDepth * max_of(inverse_depth_a, inverse_depth_b);
 }
 
-/// Whether face a is in front of face b at a screen point that both cover: the nearer face is in front, or at equal
-/// depths the face with the lower object id. `stands(solid, strip)` takes object ids and evaluates stands_on().
+/// Whether face a is in front of face b at a screen point: the nearer face, or at equal depths the lower object id.
+/// `stands(solid, strip)` takes object ids, see stands_on().
 template <typename Stands>
 PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec2 at_px, Stands&& stands) {
   const bool strip_a = is_strip(a), strip_b = is_strip(b);
@@ -187,20 +184,19 @@ PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec
   const bool first = are_equal_depths(inverse_depth_a, inverse_depth_b) ? a.object_id < b.object_id
                                                                         : inverse_depth_a > inverse_depth_b;
   if (strip_a == strip_b) return first;
-  // If, judged by depth, the solid is beneath the strip but stands on it, the solid only cuts into the road, and the
-  // order is reversed.
+  // By depth, the solid is beneath the strip. A solid that stands on the strip only cuts into the road, so the order is
+  // reversed.
   const bool is_strip_first = first == strip_a, is_from_below = is_strip_from_below(strip_a ? a : b);
   if (is_strip_first == is_from_below) return first;
   return stands(strip_a ? b.object_id : a.object_id, strip_a ? a.object_id : b.object_id) ? !first : first;
 }
 
-/// Sums over samples: of the samples' columns, of their rows, and of the offsets of their columns in eighths of a row
-/// (see sample_column_offset()).
+/// Sums over samples: columns, rows, and sample_column_offset() in eighths of a row.
 struct SampleSums {
   int32_t columns, rows, offsets;
 };
 PICTURA_HD inline SampleSums sums_of(uint64_t samples) {
-  // Each sum is computed from the bits of the column or row numbers.
+  // Computed from the bits of column and row numbers.
   const int column_0 = popcount(samples & 0xFF00FF00FF00FF00ull), column_1 = popcount(samples & 0xFFFF0000FFFF0000ull),
             column_2 = popcount(samples & 0xFFFFFFFF00000000ull);
   const int rows = popcount(samples & 0xAAAAAAAAAAAAAAAAull) + 2 * popcount(samples & 0xCCCCCCCCCCCCCCCCull) +
@@ -208,7 +204,7 @@ PICTURA_HD inline SampleSums sums_of(uint64_t samples) {
   return {column_0 + 2 * column_1 + 4 * column_2, rows, 4 * column_0 + 2 * column_1 + column_2};
 }
 
-/// Centroid of samples, relative to the pixel's corner; the pixel's centre if there are no samples.
+/// Centroid of samples, relative to the pixel's corner. Without samples, the pixel's centre.
 PICTURA_HD inline Vec2 centroid_of(uint64_t samples) {
   const int count = popcount(samples);
   if (count == 0) return {0.5f, 0.5f};
@@ -218,10 +214,9 @@ PICTURA_HD inline Vec2 centroid_of(uint64_t samples) {
           (static_cast<float>(sums.rows) + (static_cast<float>(sums.offsets) + 0.5f * n) / 8.0f) / (8.0f * n)};
 }
 
-/// A face's coverage of one pixel.
 struct Fragment {
   PixelCoverage coverage;
-  float inverse_depth = 0;  // at the centroid of the fragment's samples
+  float inverse_depth = 0;  // at the centroid of the samples
   int32_t face = 0;
 };
 
@@ -235,23 +230,21 @@ PICTURA_HD inline Vec2 pixel_center(int x, int y) {
   return {static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
 }
 
-/// Inverse depth of a face at a pixel's centre. If the face covers the pixel fully, its fragment has the same inverse
-/// depth.
+/// Inverse depth of a face at a pixel's centre.
 PICTURA_HD inline float center_inverse_depth(const ScreenFace& face, int x, int y) {
   return clamped_inverse_depth(face, pixel_center(x, y));
 }
-/// Maximum change of a face's inverse depth from the centre to anywhere in the pixel.
+/// Maximum change of the inverse depth from the centre within a pixel.
 PICTURA_HD inline float inverse_depth_half_range(const ScreenFace& face) {
   return 0.5f * (fabsf(face.inverse_depth_x) + fabsf(face.inverse_depth_y));
 }
 
-/// Number of bits of occluder_bound() that may be set: the highest bits of a float.
+/// Number of used bits of occluder_bound(), from the highest.
 constexpr int kOccluderBoundBits = 21;
-/// Lower bound of a face's inverse depth within a pixel that the face covers fully. The face hides all faces whose
-/// inverse depth is below the bound in the whole pixel. The bound of a strip is 0, because other strips may be painted
-/// over the strip, and a solid behind the strip may stand on it. The bound is never negative or NaN, because kernels
-/// sort by its bits. It is reduced by more than kEqualDepth, so that a face hides neither itself nor an equally near
-/// face.
+/// Lower bound of the inverse depth of a face that covers a pixel fully. The face hides all faces whose inverse depth
+/// is below the bound in the whole pixel. The bound of a strip is 0, because other faces may be in front. The bound is
+/// never negative, because kernels sort by its bits. It is reduced by more than kEqualDepth, so that equally near faces
+/// stay.
 PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   if (is_strip(face)) return 0.0f;
   const float lowest =
@@ -260,30 +253,28 @@ PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   return float_from_bits(bits_from_float(lowest * kLower) & ~((1u << (32 - kOccluderBoundBits)) - 1));
 }
 
-/// Whether any part of the face may be in front of the largest occluder bound of pixel (x, y). For a strip seen from
-/// below, the test includes all solids that may stand on the strip. If the result is false, the face gets no fragment,
-/// because another face, that of the largest bound, hides it. CUDA code may first test against bounds of other faces,
-/// in any order, because the largest bound rejects every face that a smaller bound rejects.
+/// Whether any part of a face may be in front of the largest occluder bound of pixel (x, y). For a strip seen from
+/// below, this includes the solids that may stand on it. CUDA code may first test smaller bounds, in any order.
 PICTURA_HD inline bool passes_occluder_bound(const ScreenFace& face, float bound, int x, int y) {
   const float nearest = center_inverse_depth(face, x, y) + inverse_depth_half_range(face);
   return !(nearest * face.nearest_standing < bound);
 }
 
-/// Order of fragments, independent of their order in the list: nearer fragments first, then by object id.
+/// Order of fragments: nearer first, then by object id.
 PICTURA_HD inline bool is_nearer(const Fragment& a, const Fragment& b, const ScreenFace* faces) {
   if (a.inverse_depth != b.inverse_depth) return a.inverse_depth > b.inverse_depth;
   const uint32_t object_id_a = faces[a.face].object_id, object_id_b = faces[b.face].object_id;
   return object_id_a != object_id_b ? object_id_a < object_id_b : a.face < b.face;
 }
 
-/// Samples that two fragments of a pixel share. A sliver (a fragment without samples) shares all samples of the other
-/// fragment. If the result is 0, neither fragment occludes the other.
+/// Samples that two fragments share. A sliver, which has no samples, shares all samples of the other. If the result is
+/// 0, neither occludes the other.
 PICTURA_HD inline uint64_t shared_samples(const PixelCoverage& a, const PixelCoverage& b) {
   return a.samples != 0 && b.samples != 0 ? a.samples & b.samples : a.samples | b.samples;
 }
 
-/// Mask of the samples at which a linear function of the screen is positive, given its value at `middle` and its
-/// gradient (not 0).
+/// Samples at which a linear function of the screen is positive. Its value at `middle` is given, and its gradient is
+/// not 0.
 PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Vec2 middle) {
   const float scale = 1.0f / length(gradient);
   const Vec2 up = gradient * scale;
@@ -292,52 +283,46 @@ PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Ve
   return samples_inside(edge, -edge.x0, -edge.y0);
 }
 
-/// Returns the shared samples at which face a is in front of face b; a and b belong to two primitives. At the other
-/// shared samples, b is in front. Usually, one decision at the centroid holds for all shared samples. If two solids
-/// intersect less than one pixel from the centroid and all_or_none is false, each sample is decided separately by the
-/// rule of is_in_front(): the lower object id is in front unless the other face is nearer by more than kEqualDepth.
+/// Returns the shared samples at which a is in front of b, a face of another primitive. Usually, the centroid decides
+/// for all samples. If two solids intersect near the centroid and all_or_none is false, each sample is decided
+/// separately, by the rule of is_in_front().
 template <typename Stands>
 PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
                                             bool all_or_none, Stands&& stands) {
   const Vec2 middle = centroid_of(shared), at = corner + middle;
-  // The face with the lower object id is always the first operand, so that swapping a and b gives the same arithmetic.
+  // The lower object id is the first operand, so that swapping a and b gives the same arithmetic.
   const bool swapped = b.object_id < a.object_id;
   const float inverse_depth_a = inverse_depth(a, at), inverse_depth_b = inverse_depth(b, at);
   const float sign = swapped ? -1.0f : 1.0f;
   const float lead =
       sign * (inverse_depth_a - inverse_depth_b) + kEqualDepth * max_of(inverse_depth_a, inverse_depth_b);
   const Vec2 gradient{sign * (a.inverse_depth_x - b.inverse_depth_x), sign * (a.inverse_depth_y - b.inverse_depth_y)};
-  // No sample is further than a pixel from the centroid along either axis.
+  // All samples are within a pixel of the centroid along each axis.
   const bool change_places = fabsf(lead) < fabsf(gradient.x) + fabsf(gradient.y) && !is_strip(a) && !is_strip(b);
   if (!change_places || all_or_none) return is_in_front(a, b, at, stands) ? shared : 0;
   const uint64_t low_first = samples_where_positive(lead, gradient, middle);
   return shared & (swapped ? ~low_first : low_first);
 }
 
-/// Whether two fragments belong to neighbouring surfaces that meet in the pixel: at least one is a sliver, and together
-/// they fill the pixel exactly. The tolerance equals the accuracy of the areas; with a larger tolerance, slivers of
-/// hidden surfaces would count as neighbours. A fragment that fills the pixel alone has no neighbour.
+/// Whether two fragments are of neighbouring surfaces: one is a sliver, and both together fill the pixel exactly. With
+/// a larger tolerance, slivers of hidden surfaces would be included.
 PICTURA_HD inline bool are_complementary(const PixelCoverage& a, const PixelCoverage& b) {
   constexpr float kExact = 1e-5f;
   return (a.samples == 0 || b.samples == 0) && max_of(a.area, b.area) < 1.0f && fabsf(a.area + b.area - 1.0f) < kExact;
 }
 
-/// Whether two fragments of a pixel may still occlude more of each other, given their visible samples. Visible samples
-/// only decrease, so if the result is false, it remains false, whatever the order of pairs.
+/// Whether two fragments may still occlude more of each other. Visible samples only decrease, so false stays false.
 PICTURA_HD inline bool may_occlude_more(uint64_t visible_a, uint64_t samples_a, uint64_t visible_b,
                                         uint64_t samples_b) {
   return ((visible_a & samples_b) | (visible_b & samples_a)) != 0;
 }
 
-/// For each of two fragments of a pixel, the samples that the other fragment occludes.
 struct OccludedSamples {
   uint64_t of_a = 0, of_b = 0;
 };
 
-/// For two fragments of different primitives, the samples of each that the other occludes. `shared` are the samples
-/// that both fragments cover; `a_first` are the shared samples at which a is in front. A sliver occludes nothing, and
-/// is occluded as a whole. A fragment that covers the whole pixel is occluded only by another such fragment (see
-/// PixelAccumulator).
+/// Samples that two fragments of different primitives hide from each other. a is in front at the shared samples
+/// `a_first`. A sliver occludes nothing and is occluded as a whole. Only full fragments occlude full fragments.
 PICTURA_HD inline OccludedSamples occluded_samples(const PixelCoverage& a, const PixelCoverage& b, uint64_t shared,
                                                    uint64_t a_first) {
   if (a.samples == 0 || b.samples == 0) {
@@ -346,8 +331,7 @@ PICTURA_HD inline OccludedSamples occluded_samples(const PixelCoverage& a, const
   return {a.is_full() && !b.is_full() ? 0 : shared & ~a_first, b.is_full() && !a.is_full() ? 0 : a_first};
 }
 
-/// Resolves the occlusion of two fragments; `corner` is the pixel's corner. Faces of one primitive do not occlude each
-/// other.
+/// Resolves the occlusion of two fragments. Faces of one primitive do not occlude each other.
 template <typename Stands>
 PICTURA_HD inline OccludedSamples occlude_pair(const PixelCoverage& a, const PixelCoverage& b, const ScreenFace& face_a,
                                                const ScreenFace& face_b, Vec2 corner, Stands&& stands) {

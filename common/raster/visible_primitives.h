@@ -1,12 +1,10 @@
-// Iteration over the primitives that may be visible in an image, one function per kind. The order depends only on the
-// scene. For renderers that draw an image in one thread.
+// Iteration over the primitives that an image may show, in an order that depends only on the scene.
 #pragma once
 
 #include "pictura/common/raster/face_setup.h"
 
 namespace pictura {
 
-/// Calls visit(box, agent) for each agent of the view's world that may be visible.
 template <typename Visit>
 PICTURA_HD inline void visit_agents(const ImageSetting& setting, const SceneBatch& scene, const View& view,
                                     Visit&& visit) {
@@ -18,7 +16,6 @@ PICTURA_HD inline void visit_agents(const ImageSetting& setting, const SceneBatc
   }
 }
 
-/// Calls visit(wall, index) for each wall that may be visible.
 template <typename Visit>
 PICTURA_HD inline void visit_walls(const ImageSetting& setting, const StaticGeometryView& geometry, Visit&& visit) {
   const Span<const WallFace> walls = geometry.walls;
@@ -31,7 +28,7 @@ PICTURA_HD inline void visit_walls(const ImageSetting& setting, const StaticGeom
       });
 }
 
-/// States of the lights in a view's world; empty if the view's images show no lights.
+/// States of the lights that a view's images show.
 PICTURA_HD inline Span<const LightState> light_states_of(const SceneBatch& scene, const View& view) {
   if ((view.hides & kHidesLights) != 0) return {};
   const int32_t begin = scene.light_begin[view.world];
@@ -39,7 +36,6 @@ PICTURA_HD inline Span<const LightState> light_states_of(const SceneBatch& scene
   return {scene.light_states.data() + begin, static_cast<size_t>(end - begin)};
 }
 
-/// Calls visit(head, state, index) for each light head that may be visible.
 template <typename Visit>
 PICTURA_HD inline void visit_lights(const ImageSetting& setting, const StaticGeometryView& geometry,
                                     const SceneBatch& scene, const View& view, Visit&& visit) {
@@ -53,7 +49,6 @@ PICTURA_HD inline void visit_lights(const ImageSetting& setting, const StaticGeo
   }
 }
 
-/// Calls visit(strip, index) for each strip that may be visible.
 template <typename Visit>
 PICTURA_HD inline void visit_strips(const ImageSetting& setting, const StaticGeometryView& geometry, Visit&& visit) {
   const Span<const Strip> strips = geometry.strips;

@@ -1,5 +1,4 @@
-// CRC-32C checksums (Castagnoli; polynomial 0x1EDC6F41, reflected), eight bytes at a time, and the masked form of
-// TFRecord files.
+// CRC-32C checksums (Castagnoli; reflected polynomial 0x1EDC6F41).
 #pragma once
 
 #include <array>
@@ -17,7 +16,7 @@ namespace crc32c_tables {
 
 constexpr std::uint32_t kReflectedPolynomial = 0x82F63B78u;
 
-/// Lookup tables: table k gives a byte's contribution to the checksum when k more bytes follow it.
+/// Table k: a byte's contribution when k more bytes follow.
 constexpr std::array<std::array<std::uint32_t, 256>, 8> make_tables() {
   std::array<std::array<std::uint32_t, 256>, 8> tables{};
   for (std::uint32_t byte = 0; byte < 256; ++byte) {
@@ -38,7 +37,7 @@ inline constexpr auto kTables = make_tables();
 
 }  // namespace crc32c_tables
 
-/// CRC-32C of bytes; crc32c("123456789") is 0xE3069283.
+/// crc32c("123456789") is 0xE3069283.
 constexpr std::uint32_t crc32c(std::string_view bytes) {
   const auto& tables = crc32c_tables::kTables;
   const auto at = [&](std::size_t i) { return static_cast<std::uint32_t>(static_cast<unsigned char>(bytes[i])); };
@@ -60,7 +59,7 @@ constexpr std::uint32_t crc32c(std::string_view bytes) {
   return ~crc;
 }
 
-/// CRC-32C as TFRecord files store it: masked, because the bytes of a record may themselves contain checksums.
+/// CRC-32C in the masked form of TFRecord files.
 constexpr std::uint32_t masked_crc32c(std::string_view bytes) {
   const std::uint32_t crc = crc32c(bytes);
   return ((crc >> 15) | (crc << 17)) + 0xA282EAD8u;

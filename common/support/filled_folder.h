@@ -1,4 +1,4 @@
-// Folders that a command fills with files whose names the command chooses.
+// Folders that a command fills with files.
 #pragma once
 
 #include <set>
@@ -9,24 +9,23 @@
 
 namespace pictura {
 
-/// A folder that a command refills. Files that an earlier call of the same kind wrote are removed, unless this call
-/// writes them again. The hidden file .pictura-KIND in the folder lists the written files; files that it does not list
-/// stay.
+/// A folder that a command fills. Files of earlier calls are removed unless they are written again. The hidden file
+/// .pictura-KIND lists the written files. Other files stay.
 class FilledFolder {
  public:
-  /// Creates the folder. Throws Error as make_output_folder() does, or if the list is a symbolic link.
+  /// Throws Error as make_output_folder() does, or if the list is a symbolic link.
   FilledFolder(std::string folder, const std::string& kind);
 
   const std::string& path() const { return folder_; }
-  /// Returns "FOLDER/NAME" for the next file to write. Throws Error if that name is a symbolic link, because the link
-  /// may lead out of the folder.
+  /// Returns "FOLDER/NAME" for a file to write. Throws Error if it is a symbolic link, which may lead out of the
+  /// folder.
   std::string file(const std::string& name);
-  /// Removes files of earlier calls whose names were not passed to file().
+  /// Removes files of earlier calls that were not written again.
   void remove_others();
 
  private:
   const std::string folder_, list_;
-  Descriptor list_file_;  // names are appended to it
+  Descriptor list_file_;
   std::set<std::string> written_, listed_;
 };
 

@@ -1,4 +1,4 @@
-// Exclusive access to a folder for one process.
+// Exclusive access to a folder.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace pictura {
 
-/// A lock on a folder, held until this object is destroyed or the process ends for any reason. It locks the file `lock`
-/// in the folder with flock; that file remains and records the last holder. The lock is advisory.
+/// An advisory lock on a folder, held until this object is destroyed or the process ends. The locked file `lock`
+/// remains and records the last holder.
 class FolderLock {
  public:
-  /// Throws Error naming the folder and, if another process holds the lock, that process.
+  /// Throws Error naming the folder, and the process that holds the lock, if any.
   explicit FolderLock(const std::string& folder);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;

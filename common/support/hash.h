@@ -1,5 +1,4 @@
-// A 64-bit hash (FNV-1a over bytes) of images, simulator states and policies. Its 16 hexadecimal digits show whether
-// the results of two runs are equal. It is not for security.
+// 64-bit hash (FNV-1a over bytes), for comparing the results of runs. It is not secure.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +17,7 @@ class Hash64 {
     const auto* bytes = static_cast<const unsigned char*>(data);
     for (std::size_t i = 0; i < size; ++i) state_ = (state_ ^ bytes[i]) * 0x100000001B3ull;
   }
-  /// Adds the bytes of the elements in order; T must have no padding.
+  /// T must have no padding.
   template <typename T>
   void add(Span<const T> values) {
     add_bytes(values.data(), values.size() * sizeof(T));

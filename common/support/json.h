@@ -1,4 +1,4 @@
-// Reading and writing of JSON. JSON has neither infinity nor NaN. External input may be nested to any depth.
+// Reading and writing of JSON, which has neither infinity nor NaN.
 #pragma once
 
 #include <cmath>
@@ -8,17 +8,15 @@
 
 namespace pictura {
 
-/// JSON values whose keys keep the order of insertion.
+/// JSON whose keys keep the order of insertion.
 using Json = nlohmann::ordered_json;
 
-/// Returns the number, or null if it is infinite or NaN.
 inline Json finite_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-/// Maximum nesting depth of JSON text, far above the depth of all files of pictura. The JSON library writes, copies and
-/// compares values recursively, so deeper values could overflow the stack.
+/// Maximum nesting depth. The JSON library recurses, so deeper values could overflow the stack.
 constexpr int kMaxJsonDepth = 64;
 
-/// Offset of the first byte of JSON text that is nested deeper than kMaxJsonDepth; npos if there is none.
+/// Offset of the first byte that is nested deeper than kMaxJsonDepth, or npos.
 inline size_t first_too_deep(std::string_view text) {
   int depth = 0;
   bool in_string = false;
@@ -38,9 +36,8 @@ inline size_t first_too_deep(std::string_view text) {
   return std::string_view::npos;
 }
 
-/// Parses JSON; all external JSON is parsed here. Throws the JSON library's parse_error if the text is not JSON or is
-/// nested deeper than kMaxJsonDepth. If allow_exceptions is false, returns a value whose is_discarded() is true
-/// instead.
+/// Parses JSON. Throws the JSON library's parse_error if the text is not JSON or too deep. Without exceptions, returns
+/// a value whose is_discarded() is true.
 template <typename Value = Json>
 Value parse_json(std::string_view text, bool allow_exceptions = true) {
   const size_t too_deep = first_too_deep(text);

@@ -1,6 +1,4 @@
-// Writer of all output files. Bytes go into a file without a name, and only a complete file gets a name. So a reader
-// never sees half a file, a full disk leaves the old file unchanged, and a killed process leaves at most a hidden file
-// behind.
+// Writer of all output files. A reader never sees an incomplete file, and a full disk leaves the old file unchanged.
 #pragma once
 
 #include <optional>
@@ -28,35 +26,31 @@ class Descriptor {
   int fd_ = -1;
 };
 
-/// Storage of the bytes before commit(). unnamed: a file without a name, or `named` if the file system has no such
-/// files. named: a hidden file next to the target. If its writer is killed, the next writer in that folder removes the
-/// hidden file.
+/// Storage of the bytes before commit(). unnamed: a file without a name, if the file system supports it. named: a
+/// hidden file next to the target. A later writer in the folder removes hidden files of killed writers.
 enum class Staging { unnamed, named };
 
-/// Whether a name is that of a hidden file of Staging::named: .pictura-*.tmp with 16 random hexadecimal digits, unlike
-/// any name that a user would choose.
+/// Whether a name has the form of hidden files of Staging::named: .pictura-*.tmp with 16 hexadecimal digits.
 bool is_temporary_name(std::string_view name);
 
 class OutputFile {
  public:
-  /// Opens a path for writing, and follows links. A target that is not a regular file (a device, a FIFO), or that is
-  /// reached by a link in /proc (as through /dev/stdout), is never replaced: commit() writes into it. If a regular file
-  /// is replaced, the new file gets its mode and, where possible, its owner. Throws Error for folders, read-only files
-  /// and other targets that cannot be written; the message names the path.
+  /// Opens a path, following links. commit() replaces a regular file, and keeps its mode and, where possible, its
+  /// owner. commit() writes into other targets, such as devices, FIFOs and /dev/stdout. Throws Error if the target is a
+  /// folder or cannot be written.
   explicit OutputFile(const std::string& path, Staging staging = Staging::unnamed);
   /// Leaves the target unchanged unless commit() was called.
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Appends bytes. Throws Error naming the path when the disk is full.
+  /// Throws Error when the disk is full.
   void write(std::string_view bytes);
-  /// Descriptor of the stored bytes, for code that writes to a descriptor. It is a seekable regular file, open for
-  /// reading and writing.
+  /// Descriptor of the stored bytes: a seekable regular file, open for reading and writing.
   int fd() const { return staged_.get(); }
 
-  /// Syncs the stored bytes to disk and makes them the target's content. Waits for a FIFO's reader. Throws Error naming
-  /// the path, and Interrupted if a signal ends the wait.
+  /// Syncs the bytes to disk, and makes them the target's content. Waits for a FIFO's reader. Throws Error, and
+  /// Interrupted if a signal ends the wait.
   void commit();
 
  private:
@@ -66,11 +60,11 @@ class OutputFile {
   void write_through();
   void replace();
 
-  std::string path_;                     // as given by the caller, for messages
-  std::string target_;                   // with links followed, except those of /proc
-  bool is_through_;                      // commit() writes into the target instead of replacing it
-  std::optional<struct stat> replaced_;  // the file that commit() replaces
-  std::string temporary_;                // the name of staged_, empty while it has none
+  std::string path_;
+  std::string target_;  // with links followed, except those of /proc
+  bool is_through_;     // commit() does not replace the target
+  std::optional<struct stat> replaced_;
+  std::string temporary_;  // name of staged_, or empty
   Descriptor staged_;
 };
 

@@ -1,6 +1,4 @@
-// Parallel loops of host code over an explicit number of threads. The calling thread owns the threads of its loops:
-// they sleep between loops and are reused. An exception in a body is rethrown in the caller; if several bodies throw,
-// the exception of the lowest item is rethrown.
+// Parallel loops on the host. If bodies throw, the caller receives the exception of the lowest item.
 #pragma once
 
 #include <algorithm>
@@ -16,25 +14,20 @@
 
 namespace pictura {
 
-/// Maximum number of threads: far above the cores of any host, and below the thread limits of systems.
 constexpr int kMaxThreads = 1024;
 
-/// Returns the number of threads to use; 0 means OpenMP's default, limited to kMaxThreads. Throws Error for numbers
-/// outside 0 to kMaxThreads.
+/// Returns the number of threads to use; 0 means OpenMP's default. Throws Error outside 0 to kMaxThreads.
 int resolve_num_threads(int num_threads);
 
-/// Calls call(body, number) in this thread with number 0, and concurrently in up to num_threads - 1 other threads with
-/// distinct numbers below num_threads. When this thread's call ends, waits only for threads that have begun: the
-/// remaining threads may have to wait for processors that other processes occupy. Nested calls run in this thread
-/// alone.
+/// Calls call(body, number) with number 0 in this thread, and with other numbers in up to num_threads - 1 other
+/// threads. Does not wait for threads that have not begun. Nested calls run in this thread alone.
 void run_on_threads(int num_threads, void (*call)(void* body, int number), void* body);
 
-/// Calls body(i), or body(i, thread) with the thread's number below num_threads, for i in [0, count), on at most
-/// num_threads threads (0: all). Bodies must not touch each other's outputs.
+/// Calls body(i), or body(i, thread), for i in [0, count), on at most num_threads threads (0: all). Bodies must not
+/// touch each other's outputs.
 template <typename Body>
 void parallel_for(int num_threads, std::int64_t count, Body&& body) {
   struct Loop {
-    // Takes items until none is left.
     void work(int thread) {
       for (std::int64_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) {
         try {

@@ -1,5 +1,4 @@
 // Writer of the wire format of Protocol Buffers. A field is a varint (field << 3 | wire type), followed by the value.
-// Numbers are stored as in memory, which must be little-endian.
 #pragma once
 
 #include <bit>
@@ -11,7 +10,6 @@ namespace pictura {
 
 static_assert(std::endian::native == std::endian::little, "the wire format is little-endian");
 
-/// Returns the bytes of a number in memory.
 template <typename T>
 std::string_view bytes_of(const T& number) {
   return {reinterpret_cast<const char*>(&number), sizeof number};
@@ -22,7 +20,7 @@ inline void append_varint(uint64_t value, std::string* out) {
   out->push_back(static_cast<char>(value));
 }
 
-/// Appends an integer. `field` is the field's number, as an integer or an enumerator.
+/// `field` is a field number or an enumerator.
 template <typename Field>
 void append_integer(Field field, uint64_t value, std::string* out) {
   append_varint(static_cast<uint64_t>(field) << 3, out);
@@ -41,7 +39,7 @@ void append_float(Field field, float value, std::string* out) {
   out->append(bytes_of(value));
 }
 
-/// Appends bytes: a text, packed numbers, or the bytes of a nested message.
+/// Appends a text, packed numbers, or a nested message.
 template <typename Field>
 void append_bytes(Field field, std::string_view bytes, std::string* out) {
   append_varint(static_cast<uint64_t>(field) << 3 | 2, out);

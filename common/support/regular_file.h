@@ -1,5 +1,4 @@
-// Check that a file is regular, for code that reads a text as a whole. Opening a FIFO would wait for its writer, and ^C
-// could not end the wait, because signals are polled only between steps of work.
+// Check that a file is regular.
 #pragma once
 
 #include <filesystem>
@@ -9,8 +8,7 @@
 
 namespace pictura {
 
-/// Throws Error naming the path if it is a FIFO, a socket or a device. Accepts folders and missing files, because
-/// reading them reports an error.
+/// Throws Error for a FIFO, a socket or a device, which could block a reader. Accepts folders and missing files.
 inline void require_regular_file(const std::string& path) {
   std::error_code ignored;
   const std::filesystem::file_status status = std::filesystem::status(path, ignored);

@@ -1,4 +1,4 @@
-// Libraries that are opened at run time, so that programs also start on machines without these libraries.
+// Libraries that are opened at run time, so that programs also start without them.
 #pragma once
 
 #include <string>
@@ -7,13 +7,12 @@
 
 namespace pictura {
 
-/// A library that stays open for the rest of the process, because drivers cannot be unloaded safely.
+/// A library that stays open, because drivers cannot be unloaded safely.
 class SharedLibrary {
  public:
-  /// Throws Error "renderer RENDERER: cannot open FILE (SOURCE): reason"; `source` tells users where to get the
-  /// library.
+  /// Throws Error "renderer RENDERER: cannot open FILE (SOURCE): reason". SOURCE describes where users get the library.
   SharedLibrary(const std::string& renderer, const std::string& file, const std::string& source);
-  /// Returns the address of a function. Throws Error naming the function.
+  /// Throws Error naming the function.
   void* function(const char* name) const;
 
  private:

@@ -1,11 +1,11 @@
-// Measurement of elapsed wall time.
+// Measurement of elapsed time.
 #pragma once
 
 #include <chrono>
 
 namespace pictura {
 
-/// Time since construction or the last restart.
+/// Wall time since construction or the last restart.
 class Stopwatch {
  public:
   void restart() { start_ = Clock::now(); }

@@ -1,4 +1,4 @@
-// Lookup of known words: the index of a word, and a "did you mean" suggestion for an unknown word.
+// Lookup of known words, with suggestions.
 #pragma once
 
 #include <string>
@@ -10,14 +10,14 @@
 
 namespace pictura {
 
-/// Returns the known word with the fewest inserted, omitted, replaced or swapped letters, regardless of case. Empty
-/// when more than a third of the word's letters would have to change.
+/// Returns the known word at the smallest edit distance, regardless of case. Empty if over a third of the letters
+/// differ.
 std::string nearest_word(std::string_view word, const std::vector<std::string>& known);
 
-/// Returns "; did you mean 'NEAREST'?", or an empty text if no known word is near.
+/// Returns "; did you mean 'NEAREST'?", or an empty text.
 std::string suggestion(std::string_view word, const std::vector<std::string>& known);
 
-/// Returns the index of a word in `known`. Throws UsageError listing the known words: "WHAT: expected a, b, got 'c'".
+/// Returns the index of a word. Throws UsageError "WHAT: expected a, b, got 'c'" for an unknown word.
 std::size_t index_of_word(std::string_view what, std::string_view word, Span<const char* const> known);
 
 }  // namespace pictura
