@@ -1,4 +1,4 @@
-// Derives the settings of cameras, renderers and simulators from a configuration.
+// Settings of cameras, renderers and simulators from a configuration.
 #pragma once
 
 #include "pictura/common/camera.h"
@@ -8,26 +8,23 @@
 
 namespace pictura {
 
-/// Returns the configuration that applies after `agent_steps` agent-steps of a run. Image sizes, policy.patch_px and
-/// render.line_floor_px follow render.schedule.
+/// Returns the configuration after `agent_steps` agent-steps of a run, according to render.schedule.
 Config config_at(const Config& config, int64_t agent_steps);
 
-/// Returns the whole number by which both the width and the height of `from` must be multiplied to get `to`, or 0 if
-/// there is no such number.
+/// Returns the whole number by which both sides of `from` must be multiplied to get `to`, or 0.
 int whole_factor(ImageSize from, ImageSize to);
 
-/// Returns the rig (cameras) of the render section after `agent_steps` agent-steps of a run.
+/// Returns the rig after `agent_steps` agent-steps of a run.
 Rig rig_of(const Config& config, int64_t agent_steps = 0);
 
-/// Returns the settings of the renderer: `rig`, which must come from rig_of(), and all other image settings. `device`
-/// is the network's device.
+/// Returns the renderer's settings. `rig` must come from rig_of(). `device` is the network's device.
 RendererConfig renderer_config(const Config& config, const Rig& rig, Device device = {});
 
-/// Returns the settings of the simulator for training. Vector observations are only enabled for a vector policy.
+/// Returns the simulator's settings for training. Only a vector policy gets vector observations.
 SimulatorConfig simulator_config(const Config& config, Device device = {});
 
-/// Returns the settings of the simulator for evaluation (paper, appendix, evaluation protocol): episodes of exactly
-/// `steps` steps, fixed conditioning, and fixed light cycles.
+/// Returns the simulator's settings for evaluation (paper, appendix, evaluation protocol). Episodes have exactly
+/// `steps` steps.
 SimulatorConfig evaluation_simulator_config(const Config& config, int steps, Device device = {});
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Keys and values of a configuration as TOML.
+// Writer of a configuration as TOML.
 #pragma once
 
 #include <concepts>
@@ -14,8 +14,7 @@
 
 namespace pictura {
 
-/// Returns the shortest TOML text from which the same number is read. For example, 0.8f becomes 0.8, not
-/// 0.800000011920929.
+/// Returns the shortest TOML text from which the same number is read.
 template <typename Real>
 std::string shortest(Real value) {
   const std::string text = fmt::format("{}", value);
@@ -68,7 +67,7 @@ class ConfigWriter {
     line(key, fmt::format("[{}, {}]", value.low, value.high));
   }
 
-  std::string toml;                                     // text of the complete file
+  std::string toml;                                     // complete file
   std::vector<std::pair<NamedKey, std::string>> lines;  // keys, and their values as written
 
  private:

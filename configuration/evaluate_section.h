@@ -8,7 +8,7 @@
 namespace pictura {
 
 struct EvaluateSection {
-  /// Conditioning of every agent, written as [evaluate.conditioning] NAME = value in the file.
+  /// Conditioning of every agent: [evaluate.conditioning] NAME = value.
   std::array<double, kNumConditioning> conditioning = default_conditioning();
   static std::array<double, kNumConditioning> default_conditioning();
 };

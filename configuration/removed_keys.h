@@ -1,5 +1,5 @@
-// Removed keys, which configurations of earlier versions may contain. Each has only one valid value: the value with
-// which the earlier version behaved like the current version.
+// Removed keys, which old configurations may contain. Each has only one valid value, which matches the current
+// behaviour.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 namespace pictura {
 
 struct RemovedKey {
-  const char *name, *value, *reason;  // the valid value, as both TOML and JSON write it
+  const char *name, *value, *reason;  // value as both TOML and JSON write it
 };
 
 inline constexpr std::array kRemovedKeys{

@@ -7,7 +7,7 @@
 namespace pictura {
 
 struct RunSection {
-  uint64_t seed = 1;            // seed of all random numbers of the run
+  uint64_t seed = 1;
   int num_threads = 0;          // threads of simulator, renderer and torch; 0: all
   std::string device = "auto";  // learning device: cpu, cuda, cuda:N or auto
 };

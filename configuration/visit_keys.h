@@ -1,4 +1,4 @@
-// List of the configuration's keys. Reading, writing, comparison and description visit this list.
+// List of the configuration's keys. Reading, writing, comparison and documentation visit it.
 #pragma once
 
 #include <array>
@@ -28,8 +28,7 @@ inline constexpr const char* kDevices = "cpu, cuda, cuda:N, auto";
 inline constexpr const char* kSizeChangesExpected =
     "a list of [agent_steps, width_px, height_px] or [agent_steps, width_px, height_px, patch_px, line_floor_px]";
 
-// Visits all keys, in the order in which they are written. Because reader and writer visit the same list, every key
-// that is read is also written. The visitor's members take (key, value, range...).
+// Visits all keys in the order of to_toml(). The visitor's members take (key, value, range...).
 template <typename AnyConfig, typename Visitor>
 void visit(AnyConfig& c, Visitor&& v) {
   const double inf = std::numeric_limits<double>::infinity();

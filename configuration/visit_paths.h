@@ -9,8 +9,7 @@
 
 namespace pictura {
 
-/// Calls visit(key, &path) for every path in the configuration: of the rig, the backbone, the teacher, other policies,
-/// map files and scenes. visit() may change the path.
+/// Calls visit(key, &path) for every path in the configuration. visit() may change the path.
 template <typename Visit>
 void visit_paths(Config* config, Visit&& visit) {
   if (!config->render.rig.empty()) visit("render.rig", &config->render.rig);
