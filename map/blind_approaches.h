@@ -1,5 +1,4 @@
-// Counts how often walls hide crossing traffic from a driver that approaches a junction. Studies of occlusion compare
-// maps by these counts.
+// Counts how often walls hide crossing traffic from a driver that approaches a junction.
 #pragma once
 
 #include <vector>
@@ -9,25 +8,23 @@
 
 namespace pictura {
 
-/// Counts of blind approaches of a map. A driver and another vehicle approach a junction on different roads, and their
-/// paths cross inside the junction. Both are at the same distance before the junction, measured along their lanes. The
-/// vehicle is hidden if walls block every tested line of sight from the driver's eye to the vehicle's box.
+/// Counts of blind approaches. A driver and a vehicle approach a junction on different roads, at equal distance. Their
+/// paths cross in the junction. The vehicle is hidden if walls block every tested line of sight to its box.
 struct BlindApproaches {
-  int32_t approaches = 0;  // lanes that lead into a path that another path crosses
-  int32_t blind = 0;       // approaches on which at least one crossing vehicle is hidden
-  int32_t crossings = 0;   // ordered pairs (driver, vehicle) of crossing paths
-  int32_t hidden = 0;      // crossings whose vehicle is hidden
+  int32_t approaches = 0;  // lanes into paths that another path crosses
+  int32_t blind = 0;       // approaches with at least one hidden vehicle
+  int32_t crossings = 0;   // ordered pairs of crossing paths
+  int32_t hidden = 0;      // crossings with a hidden vehicle
 };
 
-/// Counts blind approaches, with driver and vehicle `distance_m` before the junction. Skips a pair if the lanes before
-/// the junction are too short for this distance. The map must be validated.
+/// Skips a pair if its lanes before the junction are shorter than `distance_m`. The map must be validated.
 BlindApproaches count_blind_approaches(const RoadMap& map, Span<const WallFace> walls, float distance_m = 20.0f);
 
-/// Two lanes that lead into a junction. Walls hide traffic on `other_approach` from drivers on `approach`.
+/// Walls hide traffic on `other_approach` from drivers on `approach`.
 struct BlindCrossing {
   int32_t approach = -1, other_approach = -1;
 };
-/// Returns each pair of lanes with hidden traffic once, in ascending order of lane indices.
+/// Returns each pair of lanes once, in ascending order.
 std::vector<BlindCrossing> find_blind_crossings(const RoadMap& map, Span<const WallFace> walls,
                                                 float distance_m = 20.0f);
 

@@ -1,4 +1,4 @@
-// Finds the lanes on which an unbounded route starts, for all importers.
+// Finds the lanes on which unbounded routes start.
 #pragma once
 
 #include <cstddef>
@@ -8,18 +8,17 @@
 
 namespace pictura {
 
-/// Whether routes use lanes of this type.
 constexpr bool is_route(LaneType type) { return type == LaneType::driving || type == LaneType::ramp; }
 
-/// Groups of lanes that lane changes connect. A group's leftmost lane identifies it.
+/// Groups of lanes that lane changes connect.
 struct LaneGroups {
   std::vector<std::size_t> of_lane;  // [lanes] leftmost lane of the lane's group
-  // [lanes] Members of the group whose leftmost lane is this lane; empty for other lanes.
+  // [lanes] at the leftmost lane: all members of its group
   std::vector<std::vector<std::size_t>> members;
 };
 LaneGroups group_lanes(const RoadMap& map);
 
-/// Sets Lane::is_endless of all lanes from links, neighbours and types.
+/// Sets Lane::is_endless of all lanes.
 void find_endless_lanes(RoadMap* map);
 
 }  // namespace pictura

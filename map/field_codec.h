@@ -1,5 +1,5 @@
-// Serialization of structs whose fields PICTURA_FIELDS (map_fields.h) lists. Fields are written in declaration order; a
-// 64-bit size precedes each string and vector. Shared by the caches of maps and of scenes.
+// Serialization of structs that have a list of fields (map_fields.h). Fields are in declaration order; a 64-bit size
+// precedes each string and vector.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace pictura {
 
-/// Byte-order mark in the header of every cached file: its bytes identify the byte order of the numbers in the file.
+/// Byte-order mark in the header of every cached file.
 constexpr uint32_t kByteOrder = 0x01020304;
 
 template <typename T>
@@ -29,8 +29,7 @@ constexpr bool kIsVector = false;
 template <typename T>
 constexpr bool kIsVector<std::vector<T>> = true;
 
-/// Whether a T has the same bytes in memory as in the file and every bit pattern is valid. This is true for numbers,
-/// and for structs of numbers without padding.
+/// Whether a T has the same bytes in memory and in the file, and every bit pattern is valid.
 template <typename T>
 constexpr bool is_plain() {
   if constexpr (HasFields<T>) {
@@ -42,7 +41,7 @@ constexpr bool is_plain() {
   }
 }
 
-/// Minimum size of a T in the file, in bytes.
+/// Minimum size of a T in the file.
 template <typename T>
 constexpr uint64_t min_bytes() {
   if constexpr (HasFields<T>) {
@@ -56,8 +55,8 @@ constexpr uint64_t min_bytes() {
   }
 }
 
-/// Appends a text that describes the layout of a T: the names of its fields and the sizes of its numbers. A file that
-/// contains this text cannot be read as another type by mistake.
+/// Appends T's layout: names of fields and sizes of numbers. Files contain it, so that they cannot be read as another
+/// type.
 template <typename T>
 void append_layout(std::string* text_out) {
   if constexpr (HasFields<T>) {

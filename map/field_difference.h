@@ -1,4 +1,4 @@
-// Bitwise comparison of two structs whose fields PICTURA_FIELDS (map_fields.h) lists.
+// Bitwise comparison of structs that have a list of fields (map_fields.h).
 #pragma once
 
 #include <cstring>
@@ -61,8 +61,8 @@ std::string difference(const T& a, const T& b) {
 
 }  // namespace field_difference
 
-/// Returns the first bitwise difference as the field's path and both values, such as "lanes[3].length_m: 4 and 5".
-/// Returns an empty string if the structs are equal.
+/// Returns the first difference as the field's path and both values, such as "lanes[3].length_m: 4 and 5", or an empty
+/// string.
 template <typename T>
 std::string difference_of(const T& a, const T& b) {
   const std::string path = field_difference::difference(a, b);

@@ -1,4 +1,4 @@
-// Conversion to the coordinates of a map's file. Reports, events and tables print positions in these coordinates.
+// Conversion to the coordinates of a map's file, which reports, events and tables print.
 #pragma once
 
 #include <array>
@@ -7,8 +7,7 @@
 
 namespace pictura {
 
-/// Converts a point from map coordinates to file coordinates, both in metres. `origin_m` is the map's
-/// RoadMap::origin_m.
+/// `origin_m` is RoadMap::origin_m.
 inline std::array<double, 3> file_position_m(const std::array<double, 3>& origin_m, Vec3 point_m) {
   return {static_cast<double>(point_m.x) + origin_m[0], static_cast<double>(point_m.y) + origin_m[1],
           static_cast<double>(point_m.z) + origin_m[2]};

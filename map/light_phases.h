@@ -1,4 +1,4 @@
-// Phases of traffic lights that no controller of the map's file controls. Lights of one phase are green together.
+// Phases of traffic lights without a controller in the file.
 #pragma once
 
 #include <algorithm>
@@ -9,9 +9,8 @@
 
 namespace pictura {
 
-/// Returns the phase of a junction's approach with this heading. It is the first phase whose axis differs from the
-/// heading, or from the opposite heading, by at most 45 degrees. If there is none, a new phase is appended.
-/// `axes_inout` holds the axis of each phase: the heading, in radians, of its first approach.
+/// Returns the first phase whose axis is within 45 degrees of the heading or its opposite, else a new phase.
+/// `axes_inout` holds the heading of each phase's first approach, its axis.
 inline int32_t phase_of_heading(double heading_rad, std::vector<double>* axes_inout) {
   constexpr double kSameAxis_rad = 0.25 * std::numbers::pi;
   const auto same = std::find_if(axes_inout->begin(), axes_inout->end(), [&](double axis) {

@@ -8,17 +8,15 @@
 
 namespace pictura {
 
-/// Returns the position on segment a-b where segment c-d crosses it, as a fraction of a-b. Returns nothing if the
-/// segments do not cross.
+/// Returns where segment c-d crosses segment a-b, as a fraction of a-b, if they cross.
 std::optional<float> crossing_fraction(Vec2 a, Vec2 b, Vec2 c, Vec2 d);
 
-/// Walls in a grid. The walls must outlive this object.
+/// The walls must outlive this object.
 class LineOfSight {
  public:
   explicit LineOfSight(Span<const WallFace> walls);
 
-  /// Whether walls block the lines of sight to all nine tested points of a box: its corners, the middles of its sides
-  /// and its centre, all at half its height.
+  /// Whether walls hide nine points of a box at half its height: corners, middles of sides and centre.
   bool is_hidden(Vec3 eye_m, const AgentBox& box) const;
 
  private:

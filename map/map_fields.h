@@ -1,5 +1,5 @@
-// Lists of the fields of RoadMap and its elements. Whole maps are written, read and compared field by field with these
-// lists. An incomplete list does not compile, because a structured binding must name every field.
+// Lists of the fields of RoadMap and its elements, by which maps are written, read and compared. An incomplete list
+// does not compile.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 #include "pictura/map/opendrive/opendrive.h"
 #include "pictura/map/road_map.h"
 
-/// Defines fields_of(value), a tuple of references to all fields in declaration order, and field_names_of(value), the
-/// names of the fields separated by ", ".
+/// Defines fields_of(value), a tuple of references to the fields, and field_names_of(value), their names separated by
+/// ", ". The order is that of the declaration.
 #define PICTURA_FIELDS(Type, ...)            \
   inline auto fields_of(Type& value) {       \
     auto& [__VA_ARGS__] = value;             \
@@ -59,7 +59,7 @@ PICTURA_FIELDS(RoadMap, name, origin_m, geo_reference, road_names, lanes, lane_p
 PICTURA_FIELDS(PlanMap, xx, xy, yx, yy)
 PICTURA_FIELDS(OpenDriveOptions, chord_error_m, strict, plan)
 
-/// Calls visit(name, field) for each field of a struct that has a list, in declaration order.
+/// Calls visit(name, field) for each field of a struct that has a list.
 template <typename T, typename Visit>
 void visit_fields(const T& value, Visit&& visit) {
   std::size_t i = 0;
@@ -67,8 +67,7 @@ void visit_fields(const T& value, Visit&& visit) {
              fields_of(value));
 }
 
-/// Returns the first bitwise difference of two maps, such as "lanes[3].length_m: 4 and 5" or "lights: 8 and 9
-/// elements". Returns an empty string if the maps are equal.
+/// See difference_of() in field_difference.h.
 std::string first_difference(const RoadMap& a, const RoadMap& b);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Roads that end, on maps without endless routes: finds where routes end, and where traffic leaves and enters the map.
+// Finds where routes end, and where traffic leaves and enters a map without endless routes.
 #pragma once
 
 #include <cstdint>
@@ -8,30 +8,30 @@
 
 namespace pictura {
 
-/// A lane is open only if the longest route from its start has at least this length.
+/// Minimum length of the longest route from the start of an open lane.
 constexpr float kMinOpenWay_m = 20.0f;
 
-/// Whether an endless route starts on any lane outside junctions. If so, agents drive only on endless lanes.
+/// Whether an endless route starts on any lane outside junctions. If so, agents use only endless lanes.
 bool has_endless_roads(const RoadMap& map);
 
-/// A line across the end of a lane, where traffic leaves the map, or across its start, where traffic enters.
+/// A line across the end of a lane, where traffic leaves, or across its start, where traffic enters.
 struct LaneOpening {
   int32_t lane = -1;
   Vec3 middle_m;
-  Vec2 direction;  // direction of traffic, unit vector
+  Vec2 direction;  // unit vector in the direction of traffic
   float half_width_m = 0;
 };
 
-/// Ends of a map's driving and ramp lanes.
+/// Ends of routes on a map's lanes.
 struct OpenLanes {
-  // [lanes] Length of the longest route that continues after the end of the lane or of a lane beside it. 0 if routes
-  // end with the lane. Infinite for endless lanes, and for lanes that are neither driving nor ramp lanes.
+  // [lanes] Length of the longest route after the end of the lane or of a lane beside it. Infinite for endless lanes
+  // and for lanes where is_route() is false.
   std::vector<float> way_after_m;
-  std::vector<LaneOpening> exits;  // at the ends of lanes where routes end, except at missing links
+  std::vector<LaneOpening> exits;  // at the ends of routes, except at missing links
   // At the starts of open lanes, if neither the lane nor a lane beside it has predecessors.
   std::vector<LaneOpening> entries;
 
-  /// A missing link: routes end with lane `from`, but lane `to` starts within 1 m of its end.
+  /// Routes end with lane `from`, but lane `to` starts within 1 m of its end.
   struct MissingLink {
     int32_t from = -1, to = -1;
     float gap_m = 0;
@@ -40,17 +40,17 @@ struct OpenLanes {
 };
 OpenLanes find_open_lanes(const RoadMap& map);
 
-/// Whether a driving or ramp lane is open: the longest route from its start is finite and at least kMinOpenWay_m long.
+/// Whether the lane is a driving or ramp lane, and its longest route is finite and at least kMinOpenWay_m long.
 bool is_open(const RoadMap& map, const OpenLanes& open, std::size_t lane);
 
-/// Removes the parts of road edges that cross exits and entries, so that traffic can pass there.
+/// Removes the parts of road edges across exits and entries.
 void remove_edges_across_openings(const OpenLanes& open, RoadMap* map);
 
-/// Numbers of driving and ramp lanes by their use.
+/// Numbers of driving and ramp lanes.
 struct LaneUse {
-  int32_t endless = 0;      // lanes on which an endless route starts
-  int32_t open = 0;         // on maps without endless roads: open lanes and the lanes that follow them
-  int32_t unreachable = 0;  // all other lanes: agents are never sent there
+  int32_t endless = 0;
+  int32_t open = 0;         // without endless roads: open lanes and their successors
+  int32_t unreachable = 0;  // other lanes, which agents never use
 };
 LaneUse count_lane_use(const RoadMap& map);
 

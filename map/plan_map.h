@@ -3,7 +3,7 @@
 
 namespace pictura {
 
-/// Maps (x, y) to (xx x + xy y, yx x + yy y); the identity by default.
+/// Maps (x, y) to (xx x + xy y, yx x + yy y).
 struct PlanMap {
   double xx = 1, xy = 0, yx = 0, yy = 1;
 

@@ -1,5 +1,4 @@
-// Conversion of curves to polylines, shared by all importers. The polylines have few points, their pieces have bounded
-// length, and they deviate from the curve by at most a tolerance.
+// Conversion of curves to polylines with few points and bounded deviation.
 #pragma once
 
 #include <algorithm>
@@ -22,20 +21,18 @@ namespace pictura {
 /// Length in metres by which rounding may make pieces longer than the maximum.
 constexpr double kPieceRounding = 1e-6;
 
-/// A sample of a curve: its parameter, its position, and a width (0 for a line without width). Polylines approximate
-/// the width too. Positions are in file or map coordinates, before rounding to float.
+/// A sample of a curve, in file or map coordinates. `width` is 0 for lines.
 struct CurvePoint {
   double s = 0;
   Eigen::Vector3d position_m{0, 0, 0};
   double width = 0;
 };
 
-/// Distance in plan: on the ground plane, without height.
+/// Distance on the ground plane, without height ("in plan").
 inline double plan_distance_m(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return hypot_of(b.x() - a.x(), b.y() - a.y());
 }
 
-/// Whether the distance in plan is at most `limit_m`.
 inline bool is_within(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double limit_m) {
   const double dx = b.x() - a.x(), dy = b.y() - a.y();
   return dx * dx + dy * dy <= limit_m * limit_m;
@@ -45,9 +42,9 @@ inline Vec3 to_vec3(const Eigen::Vector3d& p) {
   return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
 }
 
-/// Deviation of `p` from the chord a-b: its distance in space, or half the error in width if that is larger.
+/// Deviation of `p` from the chord a-b: the distance in space, or half the error in width if larger.
 inline double chord_error(const CurvePoint& a, const CurvePoint& b, const CurvePoint& p) {
-  // Adds the height's term last, because another order would change the bits of imported maps.
+  // Another order of the sum would change the bits of imported maps.
   const auto dot = [](const Eigen::Vector3d& v, const Eigen::Vector3d& w) {
     return v.head<2>().dot(w.head<2>()) + v.z() * w.z();
   };
@@ -59,13 +56,12 @@ inline double chord_error(const CurvePoint& a, const CurvePoint& b, const CurveP
   return std::max(std::sqrt(dot(error, error)), 0.5 * std::abs(p.width - (a.width + u * (b.width - a.width))));
 }
 
-/// Returns the indices of a subset of the points, first and last included. Every omitted point is within `tolerance_m`
-/// of the chord that replaces it. No chord is longer (in plan) than `max_piece_m`, unless two neighbouring points are
-/// farther apart.
+/// Returns the indices of the points to keep, including both ends. Omitted points are within `tolerance_m` of their
+/// chord. Chords exceed `max_piece_m` in plan only between neighbouring points.
 std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, double tolerance_m, double max_piece_m);
 
-/// Limit on the number of samples, so that no input can exhaust memory. count_sample() throws Error beyond the limit,
-/// and Interrupted if `work` is interrupted.
+/// Limit on the number of samples. count_sample() throws Error beyond the limit, and Interrupted if `work` is
+/// interrupted.
 class SampleBudget {
  public:
   /// `source` is the map's name in messages.
@@ -86,16 +82,15 @@ class SampleBudget {
   InterruptibleWork work_;
 };
 
-/// Parameters at which a curve is cut for sampling, because its formula changes there. The curve is smooth between
-/// breaks. At a break, either formula may determine the curve's value.
+/// Parameters between which a curve is smooth. At a break, either adjacent formula may determine its value.
 struct CurveBreaks {
   std::vector<double> s;
-  // Upper bounds of the second derivatives, with respect to s, of the position and of half the width. There is one
-  // bound for each interval between two breaks, infinite if unknown. An empty vector means that all are unknown.
+  // [intervals] Upper bounds of the second derivatives of position and of half the width, with respect to s. Infinite
+  // if unknown; empty if all are unknown.
   std::vector<double> bend;
 };
 
-/// Samples eval(s) -> CurvePoint over all intervals between breaks.
+/// Samples eval(s) -> CurvePoint between the first and the last break, and thins the samples.
 template <typename Eval>
 std::vector<CurvePoint> sample_curve(const CurveBreaks& curve, double tolerance_m, double max_piece_m,
                                      SampleBudget* budget, Eval&& eval) {
@@ -103,15 +98,15 @@ std::vector<CurvePoint> sample_curve(const CurveBreaks& curve, double tolerance_
   constexpr double kMinStep = 0.01;
   constexpr double kStepsPerPiece = 4;
   constexpr double kDenseShare = 0.1;  // share of the tolerance for sampling; the rest is for thinning
-  constexpr double kSafety = 0.9;      // margin far above rounding errors
+  constexpr double kSafety = 0.9;      // far above rounding errors
   const std::vector<double>& breaks = curve.s;
   std::vector<CurvePoint> dense{eval(breaks.front())};
-  double low = 0, high = 0, bend = 0;  // range of s and bound of the second derivative in the current interval
+  double low = 0, high = 0, bend = 0;  // current interval and its bound
   auto refine = [&](auto&& self, const CurvePoint& a, const CurvePoint& b, int depth) -> void {
     budget->count_sample();
     if (depth < kMaxDepth) {
       bool is_fine = is_within(a.position_m, b.position_m, max_piece_m + kPieceRounding);
-      // A chord over an interval h of s deviates by at most h^2 / 8 times the second derivative, so most chords need no
+      // A chord over an interval h deviates by at most h^2 / 8 times the second derivative, so most chords need no
       // test.
       const double h = b.s - a.s;
       if (is_fine && a.s > low && b.s < high && bend * h * h <= 8 * kSafety * kDenseShare * tolerance_m) {
@@ -134,7 +129,7 @@ std::vector<CurvePoint> sample_curve(const CurveBreaks& curve, double tolerance_
   for (std::size_t i = 1; i < breaks.size(); ++i) {
     const double begin = dense.back().s, span = breaks[i] - begin;
     if (span <= 0) continue;
-    // Uses even steps, several per piece, so that, after thinning, pieces can be nearly as long as allowed.
+    // With several even steps per piece, thinned pieces can be nearly as long as allowed.
     const int steps = static_cast<int>(std::ceil(kStepsPerPiece * span / max_piece_m - kPieceRounding));
     low = begin;
     high = breaks[i];

@@ -1,5 +1,4 @@
-// Repairs of faults in a map's file. An importer repairs a fault if the faulty element has only one sensible meaning.
-// Repairs are counted by kind.
+// Repairs of faults in map files. A repaired fault has only one sensible meaning.
 #pragma once
 
 #include <cstdint>
@@ -86,25 +85,22 @@ enum class RepairKind : uint8_t {
   empty_rule,
 };
 
-/// First kind that only Lanelet2 files have. The table of docs/reference/opendrive_conformance.md lists the kinds
-/// before it.
 inline constexpr RepairKind kFirstLanelet2Repair = RepairKind::repeated_element;
 
-/// Returns the fault that a kind repairs, such as "records out of order".
+/// Returns the fault, such as "records out of order".
 const char* to_string(RepairKind kind);
-/// Returns the importer's action for a kind of fault, such as "sorted by their stations".
+/// Returns the importer's action, such as "sorted by their stations".
 const char* action_of(RepairKind kind);
 
-/// Returns all kinds, in order.
 std::vector<RepairKind> repair_kinds();
 
 struct Repair {
   RepairKind kind = RepairKind::record_order;
-  int32_t line = 0;     // line of the element in the file
-  std::string message;  // "OWNER: <element>: ", then the expected and the actual value
+  int32_t line = 0;
+  std::string message;  // "OWNER: <element>: ", the expected and the actual value
 };
 
-/// Returns "FILE:LINE: OWNER: <element>: ...", in the format of errors; `source` is the file's name.
+/// Returns "FILE:LINE: OWNER: <element>: ..."; `source` is the file's name.
 std::string message_of(const Repair& repair, const std::string& source);
 
 struct RepairGroup {
@@ -115,8 +111,7 @@ struct RepairGroup {
 /// Groups repairs by kind, the most frequent kinds first. The groups point into `repairs`.
 std::vector<RepairGroup> group_repairs(Span<const Repair> repairs);
 
-/// Describes repairs in one line per kind: the number of repairs, the fault, the action, and the message of the first
-/// repair. Returns no lines if there are no repairs.
+/// Returns a line per kind: number of repairs, fault, action, and the first repair's message.
 std::vector<std::string> describe_repairs(Span<const Repair> repairs, const std::string& source);
 
 }  // namespace pictura

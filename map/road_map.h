@@ -1,6 +1,5 @@
-// RoadMap: the validated, immutable road network, from any file format, that all other code reads. Positions are
-// floats, in metres relative to an origin in double precision. Indices refer to the vectors of the same RoadMap; -1
-// means none.
+// RoadMap: the validated, immutable road network. Positions are in metres relative to an origin. Indices refer to
+// vectors of the same RoadMap; -1 means none.
 #pragma once
 
 #include <array>
@@ -20,7 +19,7 @@ enum class LaneType : uint8_t {
   driving,
   bidirectional,
   parking,
-  ramp,  // the last drivable type
+  ramp,  // last drivable type
   shoulder,
   sidewalk,
   biking,
@@ -31,38 +30,38 @@ enum class LaneType : uint8_t {
   other,
 };
 
-/// Whether a lane is drivable. The road edges are the outline of the drivable lanes.
+/// The road edges are the outline of the drivable lanes.
 constexpr bool is_drivable(LaneType type) { return type <= LaneType::ramp; }
 const char* to_string(LaneType type);
 
-/// Minimum difference in height between different levels of road, such as a bridge and the road below it.
+/// Minimum difference in height between levels of road, such as a bridge and the road below it.
 constexpr float kSameRoadLevel_m = 2.0f;
 
-/// Half-open range of indices into one of RoadMap's vectors.
+/// Half-open range of indices.
 struct IndexRange {
   int32_t begin = 0, end = 0;
   int32_t size() const { return end - begin; }
 };
 
-/// A sample of a lane's centre line. Samples follow each other in the direction of travel, at most kMaxPiece_m apart.
+/// A sample of a lane's centre line, in the direction of travel. Samples are at most kMaxPiece_m apart.
 struct LanePoint {
   Vec3 position_m;
   float heading_rad = 0;
   float width_m = 0;
-  float s_m = 0;  // arc length from the lane's start
+  float s_m = 0;  // arc length
 };
 
 struct Lane {
   LaneType type = LaneType::other;
   bool in_junction = false;
-  bool is_endless = false;  // an unbounded route along successors and lane changes starts here
+  bool is_endless = false;  // an unbounded route starts here
   int32_t junction = -1;
   IndexRange points;                                // in RoadMap::lane_points, at least two
   IndexRange successors, predecessors;              // in RoadMap::lane_links, which holds lane indices
   int32_t left_neighbor = -1, right_neighbor = -1;  // driving or ramp, same direction; marks are ignored
   float length_m = 0;
   float speed_limit_mps = 0;
-  int32_t source_road = 0, source_section = 0, source_lane = 0;  // indices and id in the file; see RoadMap::road_names
+  int32_t source_road = 0, source_section = 0, source_lane = 0;  // indices, and the id in the file
 };
 
 enum class MarkColor : uint8_t { white, yellow, red, green, blue, orange, violet, black };
@@ -76,7 +75,7 @@ struct Marking {
   bool broken = false;
 };
 
-/// A piece of the outline of the drivable surface, at most kMaxPiece_m long, with the drivable side on its right.
+/// A piece of the drivable surface's outline, at most kMaxPiece_m long. The surface is on its right.
 struct RoadEdge {
   Vec3 a_m, b_m;
 };
@@ -91,66 +90,65 @@ struct ParkingSpace {
   float length_m = 0, width_m = 0;
 };
 
-/// A stop line painted in the file, whether or not a light or sign controls it.
+/// A painted stop line, whether or not a light or sign controls it.
 struct PaintedStopLine {
   Vec3 a_m, b_m;
   float width_m = 0;
 };
 
-/// A traffic sign of the file, and the lanes to which it applies (by its validity and references).
+/// A traffic sign and the lanes to which it applies.
 struct Sign {
   std::string name;           // the signal's id in the file
-  std::string type, subtype;  // codes in the catalogue of `country`; "206" is a stop sign in OpenDRIVE's own catalogue
+  std::string type, subtype;  // "206" is a stop sign in OpenDRIVE's own catalogue
   std::string country;
   Vec3 position_m;
-  float heading_rad = 0;  // heading of the traffic to which the sign applies
+  float heading_rad = 0;  // heading of the affected traffic
   IndexRange lanes;       // in RoadMap::sign_lanes
 };
 
-/// A traffic light: its stop line, head, phase, and the lanes that it controls (incoming and connecting lanes).
+/// A traffic light and the lanes that it controls.
 struct TrafficLight {
-  Vec3 stop_a_m, stop_b_m;     // the stop line, left end first as seen by traffic
+  Vec3 stop_a_m, stop_b_m;     // left end first, as seen by traffic
   float stop_heading_rad = 0;  // travel direction of the controlled traffic
-  Vec3 head_m;                 // centre of the head
+  Vec3 head_m;                 // centre
   Vec2 head_facing;            // unit vector towards the controlled traffic
-  int32_t junction = -1;       // -1: on a road away from junctions
-  // Number of the phase in the junction. Lights of one phase are green together. Phases are in the order of the
-  // junction's controllers. Without controllers, headings determine the phases.
+  int32_t junction = -1;       // -1: away from junctions
+  // Lights of one phase are green together. Phases are in the order of the junction's controllers. Without controllers,
+  // headings determine the phases.
   int32_t phase = 0;
   IndexRange lanes;  // in RoadMap::light_lanes, incoming lanes first, then connecting lanes
   std::string name;  // the signal's id in the file
 };
 
 struct Junction {
-  std::string name;        // id in the file
-  int32_t num_phases = 0;  // 0: no lights
+  std::string name;  // id in the file
+  int32_t num_phases = 0;
 };
 
-/// A straight piece of the line along which walls of buildings may be placed, behind the sidewalk.
+/// A line behind the sidewalk, along which walls may be placed.
 struct BuildingLine {
   Vec3 a_m, b_m;  // the road is on the right of a -> b
 };
 
-/// Source of an element in the map's file. `road` is an index in RoadMap::road_names, or -1 if the element is not on a
-/// road. `line` is the line of the XML element, or 0 if the element is derived or the map was not read from text.
+/// Source of an element. `road` is an index in RoadMap::road_names. `line` is the XML element's line, or 0 if there is
+/// none.
 struct SourceElement {
   int32_t road = -1, line = 0;
 };
 
-/// Sources of all elements, parallel to RoadMap's vectors of the same names.
+/// Sources of elements, parallel to RoadMap's vectors.
 struct Provenance {
   std::vector<SourceElement> lanes, markings, road_edges, crosswalks, parking_spaces, stop_lines, signs, lights,
       junctions, building_lines;
 };
 
-/// Minimum length of the lanes that MapFacts counts. Shorter lanes come from roads without length, and only link other
-/// lanes.
+/// Minimum length of counted lanes. Shorter lanes come from roads without length.
 inline constexpr float kShortestLane_m = 0.01f;
 
-/// Counts that `pictura map` prints and that tests compare with the file.
+/// Counts that `pictura map` prints.
 struct MapFacts {
   int32_t roads = 0, junction_roads = 0, junctions = 0, signal_junctions = 0, lanes = 0, driving_lanes = 0;
-  double driving_lane_km = 0, driving_lane_km_in_junctions = 0;  // along the roads' reference lines
+  double driving_lane_km = 0, driving_lane_km_in_junctions = 0;  // along the reference lines
   int32_t traffic_lights = 0, stop_lines = 0, crosswalks = 0, parking_spaces = 0;
   int32_t painted_stop_lines = 0, signs = 0;
   double z_min_m = 0, z_max_m = 0;
@@ -158,8 +156,8 @@ struct MapFacts {
 
 struct RoadMap {
   std::string name;                     // "Town01", "procedural:7", or the file's stem
-  std::array<double, 3> origin_m{};     // file coordinates of this map's (0, 0, 0)
-  std::string geo_reference;            // geographic reference of the file's coordinates, a PROJ string; may be empty
+  std::array<double, 3> origin_m{};     // file coordinates of (0, 0, 0)
+  std::string geo_reference;            // PROJ string of the file's coordinates; may be empty
   std::vector<std::string> road_names;  // [roads] id in the file
 
   std::vector<Lane> lanes;
@@ -180,7 +178,7 @@ struct RoadMap {
   std::vector<BuildingLine> building_lines;
   MapFacts facts;
   Provenance provenance;
-  std::vector<Repair> mends;  // repaired faults of the file
+  std::vector<Repair> mends;
 
   Span<const LanePoint> points_of(const Lane& lane) const {
     return {lane_points.data() + lane.points.begin, static_cast<size_t>(lane.points.size())};

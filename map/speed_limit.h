@@ -1,4 +1,4 @@
-// The default speed limit, shared by importers and simulator rules.
+// Default speed limit of importers and simulator rules.
 #pragma once
 
 namespace pictura {

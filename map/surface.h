@@ -1,4 +1,4 @@
-// Surface that consists of bands, each between two borders, with queries for the bands that cover a position.
+// Surface of bands, with queries for the bands that cover a position.
 #pragma once
 
 #include <bit>
@@ -13,37 +13,33 @@
 
 namespace pictura {
 
-/// Piece of a surface between two borders with equally many points. `left` is the left border, seen in the direction of
-/// both borders. Straight segments between the points bound the surface, so the points must be dense enough.
+/// Piece of a surface between two borders with equally many points. `left` is on the left in the direction of both.
 struct SurfaceBand {
   std::vector<Eigen::Vector3d> left, right;
 };
 
-/// Grid of the quads of all bands. A band that is `level_m` or more above or below a position does not cover it. All
-/// queries together may test a limited number of quads, far more than real road networks need. Beyond the limit,
-/// queries throw Error, so that excessively overlapping bands do not cause hours of work.
+/// Grid of the quads of all bands. A band covers only positions less than `level_m` above or below it. Queries throw
+/// Error after too many tests, so that overlapping bands do not cause hours of work. Real roads need far fewer tests.
 class Surface {
  public:
   Surface(const std::vector<SurfaceBand>& bands, double level_m);
 
-  /// Quads near the position that was passed to find_near(). They include all quads that cover any point within kNear_m
-  /// of this position.
+  /// Contains all quads that cover any point within kNear_m of the position given to find_near().
   struct Candidates {
     std::vector<int32_t> quads;
     bool are_complete = false;  // false if the circle of radius kNear_m is in several cells
   };
 
-  /// Finds the candidates near `p`, so that several queries near `p` share one lookup.
+  /// Finds the candidates for several queries near `p`.
   void find_near(const Eigen::Vector2d& p, double z, Candidates* out) const;
 
-  /// Whether `p` is covered by any band that is_wanted(band) accepts. `p` must be within kNear_m of the position that
-  /// was passed to find_near().
+  /// Whether any band that is_wanted(band) accepts covers `p`. `p` must be within kNear_m of the position given to
+  /// find_near().
   template <typename IsWanted>
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted) const {
     return any_near(near, p, z, is_wanted, [](int32_t) { return true; });
   }
-  /// Calls visit(band) for bands that is_wanted() accepts and that cover `p`, until a visit returns true; returns
-  /// whether one did.
+  /// Calls visit(band) for wanted bands that cover `p`, until a call returns true. Returns whether one did.
   template <typename IsWanted, typename Visit>
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted, Visit&& visit) const {
     if (!near.are_complete) return any_band_at(p, z, [&](int32_t band) { return is_wanted(band) && visit(band); });
@@ -55,13 +51,12 @@ class Surface {
   }
   static constexpr double kNear_m = 0.1;
 
-  /// Whether the band folds over itself at `p`, as in a turn that is tighter than the band's width. It does if one of
-  /// its quads covers `p` and is more than `reach_m` away from quad `from`, measured along the band.
+  /// Whether the band folds over itself at `p`, as in a turn tighter than its width. Then a quad more than `reach_m`
+  /// along the band from quad `from` covers `p`.
   bool is_folded_over(const Candidates& near, const Eigen::Vector2d& p, double z, int32_t band, std::size_t from,
                       double reach_m) const;
 
-  /// Calls visit(band) for every band that covers `p` at about height `z`, until a call returns true; returns whether a
-  /// call did.
+  /// Calls visit(band) for every band that covers `p`, until a call returns true. Returns whether one did.
   template <typename Visit>
   bool any_band_at(const Eigen::Vector2d& p, double z, Visit&& visit) const {
     return any_quad_at(p, z, [&](const Quad& quad) { return contains(quad, p, z) && visit(quad.band); });
@@ -71,26 +66,24 @@ class Surface {
   struct Quad {
     Eigen::Vector2d corners_m[4];  // counter-clockwise: left, right, next right, next left
     double mean_z_m = 0;
-    double s_m = 0;  // arc length from the band's start to the quad's middle, along the longer border
+    double s_m = 0;  // arc length to the quad's middle, along the longer border
     int32_t band = 0;
   };
 
-  /// Bounds that contain all positions that a quad covers, with a margin for kNear_m and rounding.
+  /// Bounds of the positions that a quad covers, with a margin for kNear_m and rounding.
   struct QuadBounds {
     Vec2 low, high;
     float low_z = 0, high_z = 0;
   };
-  /// Bounds of the quads in the grid's cells, in the order of the grid's items, with one array per side. Queries test
-  /// the bounds of eight quads at a time, and so exclude most quads of a cell.
+  /// Bounds in the order of the grid's items. Queries test eight quads at a time.
   struct ItemBounds {
-    static constexpr std::size_t kPadding =
-        7;  // bounds are read eight at a time, even if the first of them is the last item
+    static constexpr std::size_t kPadding = 7;  // the last item is read with seven more
     std::vector<float> low_x, high_x, low_y, high_y, low_z, high_z;
 
     void reserve(std::size_t count);
     void push_back(const QuadBounds& bounds);
-    /// Returns a mask: bit k is set if the bounds of item first + k contain the position (x, y, z). Bits beyond the
-    /// last item are undefined.
+    /// Bit k of the result is set if the bounds of item first + k contain the position. Bits beyond the last item are
+    /// undefined.
     uint32_t that_contain(std::size_t first, const Float8& x, const Float8& y, const Float8& z) const {
       const auto between = [&](const std::vector<float>& low, const Float8& value, const std::vector<float>& high) {
         return (load8(&low[first]) <= value) & (value <= load8(&high[first]));
@@ -99,8 +92,7 @@ class Surface {
     }
   };
 
-  /// Calls visit(index) for those quads of a cell whose bounds contain a position, until a call returns true; returns
-  /// whether a call did.
+  /// Calls visit(index) for quads of a cell whose bounds contain a position, until a call returns true.
   template <typename Visit>
   bool any_in_cell(std::size_t cell, Vec2 p, double z_m, Visit&& visit) const {
     const GridView grid = grid_.view();
@@ -117,8 +109,7 @@ class Surface {
     return false;
   }
 
-  /// Calls visit(quad) for the quads whose bounds contain a position, until a call returns true; returns whether a call
-  /// did.
+  /// Calls visit(quad) for quads whose bounds contain a position, until a call returns true.
   template <typename Visit>
   bool any_quad_at(const Eigen::Vector2d& p, double z, Visit&& visit) const {
     const GridView grid = grid_.view();
