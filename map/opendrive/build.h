@@ -1,5 +1,4 @@
-// Stages that turn a Network into a RoadMap, in the order in which parse_opendrive() runs them. Each stage fills its
-// own vectors of the map and may read vectors of earlier stages.
+// Stages that turn a Network into a RoadMap, in the order of execution.
 #pragma once
 
 #include <vector>
@@ -14,7 +13,7 @@
 
 namespace pictura::opendrive {
 
-/// Indices of a section's lanes in RoadMap::lanes, from the center outwards; -1 for lanes without surface.
+/// A section's lanes in RoadMap::lanes, from the center outwards; -1 for lanes without surface.
 struct SectionLanes {
   std::vector<int32_t> left, right;
 
@@ -40,31 +39,28 @@ struct Build {
   std::vector<LaneSource> file_lanes;  // parallel to RoadMap::lanes
   StationCache stations;
 
-  /// Converts file coordinates to map coordinates.
   Vec3 to_map(const Eigen::Vector3d& p) const { return to_vec3(from_origin(p)); }
-  /// Converts file coordinates to coordinates relative to the map's origin, without rounding to float.
+  /// Converts file coordinates to map coordinates, without rounding to float.
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const {
     return p - Eigen::Vector3d{map->origin_m[0], map->origin_m[1], map->origin_m[2]};
   }
 };
 
-/// Whether traffic on a side of the road travels towards growing s. The sign of `side` is that of the side's lane ids.
-/// Returns true for the right side of the reference line in right-hand traffic.
+/// Whether traffic travels towards growing s. The sign of `side` is that of the side's lane ids.
 constexpr bool travels_forward(const FileRoad& road, int side) { return (side < 0) != road.left_hand; }
 inline bool travels_forward(const FileRoad& road, const FileLane& lane) {
   return travels_forward(road, lane.id) != (lane.direction == LaneDirection::reversed);
 }
 
-/// Sets the map's origin to the centre of the reference lines, in whole metres.
+/// Sets the origin to the centre of the reference lines, in whole metres.
 void choose_origin(Build* build);
 
-/// Returns the provenance of an element on road `road` of the network.
+/// `road` is an index in the network.
 inline SourceElement source_of(std::size_t road, const SourceLocation& where) {
   return {static_cast<int32_t>(road), where.line()};
 }
 
-/// These three stages build lanes of every type except "none": centre lines and neighbours, then links, then speed
-/// limits.
+/// These stages build lanes of every type except "none": centre lines and neighbours, then links, then speed limits.
 void build_lanes(Build* build);
 void link_lanes(Build* build);
 void set_speed_limits(Build* build);
@@ -72,18 +68,16 @@ void set_speed_limits(Build* build);
 /// Builds the outline of the drivable surface.
 void build_road_edges(Build* build);
 
-/// Removes road edges where traffic leaves or enters the map, and records missing links. Call this only for maps
-/// without endless roads (has_endless_roads()).
+/// Removes road edges where traffic leaves or enters a map without endless roads, and records missing links.
 void open_road_ends(Build* build);
 
-/// build_markings() builds lane marks; build_objects() builds crosswalks, parking spaces and stop lines.
+/// build_markings() builds lane marks. build_objects() builds crosswalks, parking spaces and stop lines.
 void build_markings(Build* build);
 void build_objects(Build* build);
 
 /// Builds junctions, traffic lights and signs.
 void build_signals(Build* build);
 
-/// Builds the lines along which walls may be placed.
 void build_building_lines(Build* build);
 
 void count_facts(Build* build);

@@ -1,5 +1,4 @@
-// Positions relative to a reference line, which consists of OpenDRIVE's lines, arcs, spirals and plane cubics. Also
-// values of the cubics of elevation, banking, offsets and widths. Numbers are doubles in file coordinates.
+// Positions relative to OpenDRIVE's reference lines, in doubles and file coordinates.
 #pragma once
 
 #include <cmath>
@@ -13,39 +12,37 @@ namespace pictura::opendrive {
 struct Pose {
   Eigen::Vector2d position_m{0, 0};
   double heading = 0, curvature = 0;
-  double stretch = 1;  // metres of the line per metre of s; 1 if the road is not deformed
+  double stretch = 1;  // metres of the line per metre of s; 1 without deformation
 };
 
-/// Fills the table of arc lengths of a cubic up to its p_end.
+/// Fills the table of arc lengths.
 void measure(PlaneCubic* cubic);
 
-/// Fills the integration panels of a spiral. Does nothing for other pieces, because they have no panels.
+/// Fills the integration panels of a spiral. Does nothing for other pieces.
 void measure(GeometryPiece* piece);
 
-/// Returns the pose at distance `ds` from the start of a piece. It is exact for lines and arcs. Spirals use
-/// Gauss-Legendre quadrature, and require an earlier call of measure(). Plane cubics are parametrised by arc length,
-/// which is scaled so that the cubic ends at the end of the piece.
+/// Returns the pose at distance `ds` from the start of a piece. Spirals require an earlier measure(). Plane cubics are
+/// parametrised by arc length, scaled to end at the piece's end.
 Pose pose_on(const GeometryPiece& piece, double ds);
 
-/// Returns the pose of the reference line at s, which is clamped to the road.
+/// Clamps s to the road.
 Pose pose_at(const FileRoad& road, double s);
 
-/// Applies the deformation of a road to a point at station s. Returns the point unchanged if the road is not deformed.
+/// Applies the road's deformation, if any, to a point at station s.
 Eigen::Vector2d deformed_point(const FileRoad& road, double s, const Eigen::Vector2d& point_m);
 
-/// Returns the length of the reference line between the stations `begin` and `end`. It differs from `end` - `begin`
-/// only on deformed roads.
+/// Returns the length of the reference line between two stations. It differs from `end` - `begin` only on deformed
+/// roads.
 double length_between(const FileRoad& road, double begin, double end);
 
-/// A point of the reference line: its position, the unit vector to the left, and its elevation.
+/// A point of the reference line, with the unit vector to the left.
 struct Station {
   double s = 0;
   Eigen::Vector2d position_m{0, 0}, left{0, 1};
   double elevation_m = 0;
 };
 
-/// Cache of the unit vector of the last heading. It is effective on straight lines, along which the heading is
-/// constant.
+/// Cache of the last heading's unit vector, for straight lines.
 class LastDirection {
  public:
   /// Returns (cos, sin) of the heading.
@@ -62,8 +59,7 @@ class LastDirection {
   Eigen::Vector2d direction_{0, 0};
 };
 
-/// Cache of about a thousand stations of the current road. It is effective because neighbouring lanes and both borders
-/// of a lane are sampled at the same stations.
+/// Cache of stations of the current road, because neighbouring lanes are sampled at equal stations.
 class StationCache {
  public:
   const Station& at(const FileRoad& road, double s);
@@ -76,44 +72,40 @@ class StationCache {
   LastDirection direction_;
 };
 
-/// Returns the point `t` metres to the left of the reference line at s, with its height. The distance t is measured
-/// along the banked road surface. s is clamped to the road.
+/// Returns the point `t` metres to the left of the reference line, measured along the banked surface. Clamps s to the
+/// road.
 Eigen::Vector3d point_at(const FileRoad& road, double s, double t);
 Eigen::Vector3d point_at(const FileRoad& road, double s, double t, StationCache* cache);
 
-/// Returns the point on a lane at s. `outer_fraction` is 0 on the inner border and 1 on the outer border. The lane's
-/// <height> is included.
+/// Returns a point on a lane, including its <height>. `outer_fraction` is 0 on the inner and 1 on the outer border.
 Eigen::Vector3d point_on_lane(const FileRoad& road, const FileSection& section, const FileLane& lane, double s,
                               double outer_fraction, StationCache* cache);
 
-/// Returns the heading of the line midway between the borders `inner` and `outer`, in the direction of growing s.
+/// Returns the heading midway between two borders, towards growing s.
 double heading_between(const FileRoad& road, const FileSection& section, int inner, int outer, double s);
 
-/// A lane border at a station s: its lateral position t, and the derivative of t with respect to s.
+/// Lateral position t of a lane border, and its derivative with respect to s.
 struct Border {
   double t = 0, slope = 0;
 };
 
-/// Returns a lane border at s. Border 0 is the centre line. Border k is the outer border of lane k, on the left for k >
-/// 0 and on the right for k < 0. Negative widths count as 0. A border that would be inside the previous border
-/// coincides with the previous border.
+/// Border 0 is the centre line, and border k is the outer border of lane k. Negative widths count as 0. Borders never
+/// cross: a border inside the previous border coincides with it.
 Border border_at(const FileRoad& road, const FileSection& section, int border, double s);
 
-/// Returns the width of a lane at s, measured along the banked surface.
+/// Returns the width along the banked surface.
 double lane_width(const FileRoad& road, const FileSection& section, const FileLane& lane, double s);
 
-/// Returns the number of a lane's inner border. It is the id of the next lane inwards, or 0.
+/// Returns the lane's inner border: the id of the next lane inwards, or 0.
 constexpr int inner_border(int lane_id) { return lane_id > 0 ? lane_id - 1 : lane_id + 1; }
 
-/// Returns every s in [begin, end] at which a formula changes, sorted, including begin and end. Formulas change where
-/// pieces of geometry begin, and where cubics of elevation, banking or lane offset begin. For the lanes up to `border`,
-/// they also change where cubics of widths and heights begin.
+/// Returns `begin`, `end` and every s between them where a piece or cubic begins, sorted. Considers geometry,
+/// elevation, banking, lane offset, and the widths and heights of lanes up to `border`.
 std::vector<double> formula_changes(const FileRoad& road, const FileSection& section, int border, double begin,
                                     double end);
 
-/// Returns the breaks of formula_changes(). Unless the road is banked, also returns an upper bound of the second
-/// derivatives of the lane's width and of positions for each interval between breaks. The bound holds for positions on
-/// the lane and up to `beyond_m` outside its borders.
+/// Returns formula_changes(). Without banking, also bounds the second derivatives of the lane's width and of positions.
+/// The bounds include positions up to `beyond_m` outside the lane.
 CurveBreaks breaks_of(const FileRoad& road, const FileSection& section, int lane, double begin, double end,
                       double beyond_m = 0);
 

@@ -1,4 +1,4 @@
-// Parses the XML of an OpenDRIVE file, and rejects unsafe documents.
+// Parses the XML of an OpenDRIVE file.
 #pragma once
 
 #include <string_view>
@@ -10,8 +10,8 @@
 
 namespace pictura::opendrive {
 
-/// Parses `text`. Throws Error, which names source and line, if the text is not well-formed UTF-8 XML. Also throws
-/// Error for a document type, an <include>, nesting of more than 64 elements, and an attribute of more than 4 KiB.
+/// Throws Error, which names source and line, if `text` is not well-formed UTF-8 XML. Also throws Error for unsafe
+/// documents: with a document type, an <include>, more than 64 nested elements, or an attribute of more than 4 KiB.
 void read_document(std::string_view text, const Source& source, pugi::xml_document* document_out);
 
 }  // namespace pictura::opendrive

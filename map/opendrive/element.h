@@ -1,5 +1,5 @@
-// Checked access to elements of the XML tree. A missing, malformed or out-of-range attribute throws Error, which names
-// the element, its line and its owner. An attribute that still has a sensible meaning is repaired instead.
+// Checked access to XML elements. Functions throw Error, which names element, line and owner, for missing, malformed or
+// out-of-range attributes. Some faults are repaired instead.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,7 @@
 
 namespace pictura::opendrive {
 
-/// An XML element, with the name of its owner ("road 12"). The document, the source, the faults and the owner's name
-/// must outlive the Element.
+/// An XML element and the name of its owner ("road 12"). All constructor arguments must outlive the Element.
 class Element {
  public:
   Element(pugi::xml_node node, const Source* source, Faults* faults, const std::string* owner)
@@ -28,8 +27,7 @@ class Element {
   [[noreturn]] void fail(fmt::format_string<Args...> format, Args&&... args) const {
     where().fail_with(fmt::format(format, std::forward<Args>(args)...));
   }
-  /// Records a fault, which the caller then repairs as action_of(kind) describes. If faults are strict, throws Error
-  /// with the message instead.
+  /// See Faults::record_repair().
   template <typename... Args>
   void record_repair(RepairKind kind, fmt::format_string<Args...> format, Args&&... args) const {
     where().record_repair(faults_, kind, format, std::forward<Args>(args)...);
@@ -38,7 +36,6 @@ class Element {
   explicit operator bool() const { return static_cast<bool>(node_); }
   Element child(const char* name) const { return {node_.child(name), source_, faults_, owner_}; }
   Element required_child(const char* name) const;
-  /// Calls visit(Element) for every child with that name.
   template <typename Visit>
   void each(const char* name, Visit&& visit) const {
     for (const pugi::xml_node node : node_.children(name)) visit(Element(node, source_, faults_, owner_));
@@ -52,34 +49,33 @@ class Element {
   std::string_view name() const { return node_.name(); }
   Element with_owner(const std::string* owner) const { return {node_, source_, faults_, owner}; }
 
-  /// Whether the attribute exists and is not empty. Some writers leave unset attributes empty.
+  /// Whether the attribute exists and is not empty.
   bool has(const char* attribute) const;
   std::string text(const char* attribute) const;
   std::string text(const char* attribute, const char* fallback) const;
   /// Reads a finite number.
   double number(const char* attribute) const;
   double number(const char* attribute, double fallback) const { return has(attribute) ? number(attribute) : fallback; }
-  /// Reads a finite number. Returns nothing if the attribute is missing or not a finite number.
+  /// Returns nothing if the attribute is missing or not a finite number.
   std::optional<double> finite_number(const char* attribute) const;
   double number_in(const char* attribute, double low, double high) const;
   double number_in(const char* attribute, double low, double high, double fallback) const {
     return has(attribute) ? number_in(attribute, low, high) : fallback;
   }
-  /// Reads a number. Repair: a missing attribute counts as 0.
+  /// Repair: a missing attribute counts as 0.
   double number_or_zero(const char* attribute) const;
   double number_or_zero_in(const char* attribute, double low, double high) const;
-  /// Reads a size in [0, high]. Returns 0 for a missing size; the caller then uses its default. Repair: a negative size
-  /// counts as missing, because some writers set -1.
+  /// Reads a size in [0, high]. Returns 0 for a missing size. Repair: a negative size counts as missing.
   double size(const char* attribute, double high) const;
   int integer(const char* attribute) const;
-  /// Reads a flag. A missing flag is false. Repair: a value other than true, false, 1 and 0 counts as false.
+  /// A missing flag is false. Repair: a value other than true, false, 1 and 0 counts as false.
   bool flag(const char* attribute) const;
 
   /// Returns the text between the element's tags.
   std::string content() const { return node_.text().as_string(); }
 
  private:
-  /// Whether the attribute exists. Records the repair of a missing attribute.
+  /// Like has(), but records the repair of a missing attribute.
   bool has_or_zero(const char* attribute) const;
 
   pugi::xml_node node_;
@@ -88,17 +84,16 @@ class Element {
   const std::string* owner_;
 };
 
-// Maximum difference of stations that count as equal.
+// Maximum difference of equal stations.
 inline constexpr double kStationTolerance_m = 1e-3;
 
-/// Reads from `attribute` the station from which a record applies. It should be in [0, length]. Repairs: a record
-/// before the start applies from the start. A record beyond the end is omitted; nullopt is returned for it. A missing
-/// attribute counts as `fallback` if there is one.
+/// Reads the station from which a record applies, which should be in [0, length]. Repairs: a record before the start
+/// applies from the start. Returns nullopt for a record beyond the end. A missing attribute counts as
+/// `fallback`, if given.
 std::optional<double> read_station(const Element& record, const char* attribute, double length,
                                    std::optional<double> fallback = std::nullopt);
 
-/// Appends the record of `element`. If it begins before the previous record, the fault is recorded; the caller repairs
-/// it by sort_records() after all records are read.
+/// Appends a record. Records a fault if the previous record begins later; the caller must then call sort_records().
 template <typename Record>
 void append_record(const Element& element, const char* attribute, double Record::* station, Record record,
                    std::vector<Record>* records) {
@@ -109,19 +104,16 @@ void append_record(const Element& element, const char* attribute, double Record:
   records->push_back(std::move(record));
 }
 
-/// Sorts records by station. Records at equal stations keep the order of the file, because the last of them is in
-/// effect.
+/// Sorts records by station. Records at equal stations keep their order, because the last of them applies.
 template <typename Record>
 void sort_records(double Record::* station, std::vector<Record>* records) {
   std::stable_sort(records->begin(), records->end(),
                    [station](const Record& a, const Record& b) { return a.*station < b.*station; });
 }
 
-/// Reads the coefficients of a cubic that begins at s.
 Cubic read_cubic(const Element& element, double s);
 
-/// Reads the cubics in the children `name` of `parent`, sorted by station. The attribute named `station` contains each
-/// cubic's station, which must be in [0, length].
+/// Reads the cubics in the children `name`, sorted by station. The attribute named `station` must be in [0, length].
 Profile read_profile(const Element& parent, const char* name, const char* station, double length);
 
 }  // namespace pictura::opendrive

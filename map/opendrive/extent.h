@@ -1,4 +1,4 @@
-// Checks that a road's offsets, heights, banking and widths are plausible, so that later stages need no checks.
+// Checks that a road's offsets, heights, banking and widths are plausible.
 #pragma once
 
 #include "pictura/common/error_types.h"
@@ -7,8 +7,7 @@
 
 namespace pictura::opendrive {
 
-/// Throws Error if an offset, height, banking or width exceeds its limit anywhere along the road. Repair: negative
-/// widths count as zero.
+/// Throws Error if a value exceeds its limit anywhere along the road. Repair: negative widths count as zero.
 void check_extent(const FileRoad& road, Faults* faults);
 
 }  // namespace pictura::opendrive

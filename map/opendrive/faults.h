@@ -1,5 +1,4 @@
-// Faults of a file that have only one sensible meaning. Such faults are repaired and recorded. Strict reading refuses
-// them.
+// Faults of a file that have only one sensible meaning. They are repaired and recorded.
 #pragma once
 
 #include <string>
@@ -15,8 +14,7 @@ class Faults {
  public:
   explicit Faults(bool strict) : strict_(strict) {}
 
-  /// Records a fault, which the caller then repairs as action_of(kind) describes. In strict reading, throws Error with
-  /// the fault's message instead.
+  /// Records a fault, which the caller repairs as action_of(kind) describes. In strict reading, throws Error instead.
   void record_repair(Repair repair, const std::string& source) {
     if (strict_) throw Error(message_of(repair, source));
     // The limit bounds memory.

@@ -7,16 +7,15 @@
 
 namespace pictura::opendrive {
 
-/// Type of signals that are traffic lights.
+/// Type of traffic lights.
 inline constexpr std::string_view kLightType = "1000001";
 
-/// Whether a signal or signal reference applies to a lane of its road. A signal's validity takes precedence over its
-/// orientation.
+/// Whether a signal or reference applies to a lane of its road. Its validity takes precedence over its orientation.
 bool applies_to(const FileLane& lane, const FileRoad& road, Orientation orientation,
                 const std::vector<LaneRange>& validity);
 
-/// Splits sections at the stop lines of lights that no controller controls and whose lanes do not lead to a junction.
-/// Heads of one orientation within 20 m share a stop line. The stop line is at the head that traffic reaches first.
+/// Splits sections at the stop lines of lights without a controller whose lanes do not lead to a junction. Heads of one
+/// orientation within 20 m share the stop line of the head that traffic reaches first.
 void split_at_lights(Network* network);
 
 }  // namespace pictura::opendrive

@@ -1,6 +1,5 @@
-// Contents of an OpenDRIVE file as plain structs in the file's own terms: s and t along reference lines, lane ids,
-// signal ids. The reader fills the structs and checks every attribute; the build stages turn the structs into a
-// RoadMap.
+// Contents of an OpenDRIVE file in the file's own terms. The reader checks every attribute, and the build stages turn
+// the structs into a RoadMap.
 #pragma once
 
 #include <array>
@@ -19,7 +18,7 @@
 
 namespace pictura::opendrive {
 
-/// Name of the file and positions of its line ends. Converts the byte offset of an element to its line, counted from 1.
+/// Name of the file, and the line numbers of byte offsets. The first line is 1.
 class Source {
  public:
   Source() = default;
@@ -33,7 +32,7 @@ class Source {
   std::vector<std::ptrdiff_t> line_ends_;
 };
 
-/// Location of an element: its byte offset in the text and its owner ("road 12", "junction 3").
+/// Byte offset of an element, and its owner ("road 12", "junction 3").
 struct SourceLocation {
   const Source* source = nullptr;
   std::ptrdiff_t offset = 0;
@@ -49,7 +48,7 @@ struct SourceLocation {
     fail_with(fmt::format(format, std::forward<Args>(args)...));
   }
 
-  /// Records a fault that the caller repairs, or throws Error in strict reading; see Faults.
+  /// See Faults::record_repair().
   void record_repair_with(Faults* faults, RepairKind kind, const std::string& message) const;
 
   template <typename... Args>
@@ -58,12 +57,12 @@ struct SourceLocation {
   }
 };
 
-/// The cubic a + b ds + c ds^2 + d ds^3. At a station s' >= s, ds is s' - s.
+/// The cubic a + b ds + c ds^2 + d ds^3, where ds is the distance from s.
 struct Cubic {
   double s = 0, a = 0, b = 0, c = 0, d = 0;
 };
 
-/// A piecewise cubic function of s; its value is 0 before the first cubic. Cubics are in ascending order of s.
+/// Piecewise cubic function of s; 0 before the first cubic. Cubics are sorted by s.
 struct Profile {
   std::vector<Cubic> cubics;
 
@@ -71,66 +70,65 @@ struct Profile {
   double slope(double s) const;
 };
 
-/// A parametric cubic (u(p), v(p)) in the frame of its start, for p from 0 to p_end. A <poly3> has u = p.
+/// A parametric cubic (u(p), v(p)) in the frame of its start, for p in [0, p_end]. A <poly3> has u = p.
 struct PlaneCubic {
   std::array<double, 4> u{}, v{};  // coefficients of p^0 to p^3
   double p_end = 0;
-  std::array<double, 17> arc_length{};  // arc length from the start to p = p_end * i / 16; see measure() in curves.h
+  std::array<double, 17> arc_length{};  // arc length to p = p_end * i / 16; set by measure()
 };
 
-/// A piece of a reference line. It is a cubic, or a curve whose curvature changes linearly from start to end. Lines
-/// have curvature 0, and arcs have equal curvatures at both ends.
+/// A piece of a reference line: a cubic, or a curve whose curvature changes linearly along it.
 struct GeometryPiece {
   double s = 0, x = 0, y = 0, heading = 0, length = 0;
   double start_curvature = 0, end_curvature = 0;
   std::optional<PlaneCubic> cubic;
-  // Start of each integration panel, in the frame of the piece's start; only for spirals. See measure() in curves.h.
+  // Starts of a spiral's integration panels, relative to the piece's start; set by measure().
   std::vector<std::array<double, 2>> panels;
 };
 
-/// One stripe of a mark, read from a <line> element.
+/// A <line> of a mark.
 struct MarkLine {
-  double length = 0, space = 0;  // lengths of a dash and of the gap after it; explicit lines have no gap
-  double t_offset = 0;           // offset of the stripe's centre line to the left of the lane's border
-  double s_offset = 0;           // start of the first dash, from the start of the mark
-  double width = 0;              // 0: use the mark's width
+  double length = 0, space = 0;  // lengths of a dash and of the gap after it
+  double t_offset = 0;           // centre line, to the left of the lane's border
+  double s_offset = 0;           // first dash, from the start of the mark
+  double width = 0;              // 0: the mark's width
   std::optional<MarkColor> color;
 };
 
 enum class LaneChange : uint8_t { both, increase, decrease, none };
 
 struct RoadMark {
-  double s_offset = 0;  // start relative to the section's s; negative on continued lanes
+  double s_offset = 0;  // from the section's s; negative on continued lanes
   std::string type;     // "none", "solid", "broken solid", ...
   bool bold = false;
   MarkColor color = MarkColor::white;
-  double width = 0;                           // 0: the file gives no width
-  LaneChange lane_change = LaneChange::both;  // permitted directions of lane changes across the mark
+  double width = 0;                           // 0: not given
+  LaneChange lane_change = LaneChange::both;  // permitted directions of lane changes
   std::vector<MarkLine> lines;                // repeated along the mark, in place of the pattern of `type`
   std::vector<MarkLine> explicit_lines;       // painted once each
-  Profile sway;  // shift of the lines to the left, as a function of s minus the mark's start
+  Profile sway;                               // shift to the left, as a function of s minus the mark's start
   SourceLocation where;
 };
 
-/// Direction of traffic relative to the road's rule (right-hand or left-hand traffic): same, opposite or both.
+/// Direction of traffic relative to the road's rule.
 enum class LaneDirection : uint8_t { standard, reversed, both };
 
 struct FileLane {
-  int id = 0;  // positive on the left of the reference line, negative on the right, 0 for the centre lane
+  int id = 0;  // positive on the left of the reference line
   std::string type_name;
   LaneType type = LaneType::other;
-  int section = 0;            // index of the file's <laneSection> in the road, from 0
+  int section = 0;            // index in the file
   bool is_continued = false;  // continues a <lane> of an earlier FileSection
   bool is_void = false;       // type "none": no surface
-  bool is_level = false;      // on banked roads the lane keeps the height of its inner border
+  bool is_level = false;      // keeps the height of its inner border on banked roads
   LaneDirection direction = LaneDirection::standard;
   std::vector<int> predecessors, successors;
   // Functions of s minus the section's s.
   Profile width;
-  Profile border;                      // t of the outer border from the reference line; used if the lane has no widths
+  Profile border;                      // t of the outer border; used if the lane has no widths
   Profile inner_height, outer_height;  // heights of the borders above the road; piecewise constant
   Profile speed_limit_mps;             // piecewise constant; 0: no limit
-  std::vector<RoadMark> marks;         // on the outer border, in ascending order of s_offset
+  std::vector<RoadMark> marks;         // on the outer border, sorted by s_offset
   SourceLocation where;
 };
 
@@ -171,18 +169,17 @@ struct FileSignal {
   SourceLocation where;
 };
 
-/// Reference in a road to a signal of any road. The signal then applies to lanes of the road that contains the
-/// reference.
+/// Reference to a signal of any road. The signal applies to lanes of the road that contains the reference.
 struct SignalReference {
   std::string signal;
   double s = 0, t = 0;
   Orientation orientation = Orientation::either;
-  std::vector<LaneRange> validity;  // empty: all lanes of this orientation
-  std::optional<double> stop_s;     // see FileSignal::stop_s
+  std::vector<LaneRange> validity;
+  std::optional<double> stop_s;
   SourceLocation where;
 };
 
-/// An object. The corners of its outline are (u, v) in the object's frame, or (s, t) of the road if along_road is set.
+/// Corners are (u, v) in the object's frame, or (s, t) of the road if along_road is set.
 struct FileObject {
   enum class Kind : uint8_t { crosswalk, parking_space, stop_line } kind = Kind::crosswalk;
   std::string id, name;
@@ -195,31 +192,31 @@ struct FileObject {
   SourceLocation where;
 };
 
-/// Height of the surface above the banked road at one s, as a function of t.
+/// Height above the banked road as a function of t.
 struct CrossSection {
   double s = 0;
   Profile height;
 };
 
-/// Deformation of a road's points in an affine copy of its map; see deform.h. The shift of the reference line changes
-/// from start to end as a smoothstep of s. So the heading does not change at either end.
+/// Deformation of a road in an affine copy (deform.h). The shift is a smoothstep of s, so headings at the ends do not
+/// change.
 struct RoadDeformation {
   PlanMap plan;
   std::array<double, 2> start_shift_m{}, end_shift_m{};
 };
 
 struct FileRoad {
-  std::string id, junction;  // junction is empty for roads outside junctions
+  std::string id, junction;  // `junction` is empty outside junctions
   double length = 0;
-  bool left_hand = false;  // left-hand traffic
+  bool left_hand = false;
   RoadLink predecessor, successor;
   Profile speed_limit_mps;  // piecewise constant; 0: no limit
   std::vector<GeometryPiece> geometry;
-  std::optional<RoadDeformation> deformation;  // if set, s is a parameter instead of an arc length
+  std::optional<RoadDeformation> deformation;  // if set, s is not an arc length
   Profile elevation, lane_offset;
-  Profile superelevation;                   // rad, rotation about the reference line; positive: left side up
-  Profile left_crossfall, right_crossfall;  // rad, slope of each side; positive: down from the reference line
-  std::vector<CrossSection> shape;          // in ascending order of s; heights between them are interpolated
+  Profile superelevation;                   // rad; positive: left side up
+  Profile left_crossfall, right_crossfall;  // rad; positive: down from the reference line
+  std::vector<CrossSection> shape;          // sorted by s; heights between them are interpolated
   std::vector<FileSection> sections;
   std::vector<FileObject> objects;
   std::vector<FileSignal> signals;
@@ -233,9 +230,9 @@ struct LaneLink {
 };
 
 struct Connection {
-  std::string incoming_road, connecting_road;       // in direct junctions, connecting_road is the linked road itself
+  std::string incoming_road, connecting_road;       // in direct junctions, connecting_road is the linked road
   ContactPoint contact = ContactPoint::start;       // end of the connecting road at the incoming road
-  bool has_contact = true;                          // false: missing in the file and determined by repair_links()
+  bool has_contact = true;                          // see RoadLink
   ContactPoint incoming_end = ContactPoint::start;  // end of the incoming road at the junction; set by repair_links()
   std::vector<LaneLink> lane_links;
   SourceLocation where;
@@ -243,7 +240,7 @@ struct Connection {
 
 struct FileJunction {
   std::string id;
-  bool is_direct = false;  // roads are linked directly, without connecting roads
+  bool is_direct = false;  // has no connecting roads
   std::vector<Connection> connections;
   std::vector<std::string> controllers;
   SourceLocation where;

@@ -1,5 +1,4 @@
-// Checks the links between roads and junctions of a whole file, and repairs links whose meaning follows from geometry
-// or from the linked road. Later stages can therefore follow every link.
+// Checks and repairs the links between roads and junctions.
 #pragma once
 
 #include "pictura/map/opendrive/faults.h"
@@ -7,8 +6,8 @@
 
 namespace pictura::opendrive {
 
-/// Repairs links as action_of() describes. Afterwards, all targets of road links, junctions of roads, and roads of
-/// connections exist. Contact points are known, and Connection::incoming_end is set.
+/// Repairs links as action_of() describes. Afterwards, all targets of links exist, contact points are known, and
+/// Connection::incoming_end is set.
 void repair_links(Network* network, Faults* faults);
 
 }  // namespace pictura::opendrive

@@ -1,5 +1,4 @@
-// Splits and removes lane sections, and makes profiles constant from a station on. After a split, a lane of the file
-// has one FileLane in each part; the later ones are marked is_continued.
+// Splits and removes lane sections, and makes profiles constant from a station on.
 #pragma once
 
 #include <vector>
@@ -8,27 +7,25 @@
 
 namespace pictura::opendrive {
 
-/// Splits the lanes of a section at the distance `ds` from its start. Returns the parts after the split as lanes of a
-/// new section; `lanes` keeps the parts before it. Each lane and its continuation are linked to each other.
+/// Splits lanes at `ds` from their section's start, and links both parts. Returns the later parts, which are marked
+/// is_continued.
 std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds);
 
-/// Removes a section without length. The previous section is extended to the removed section's end. Links into the
-/// removed section lead to the section beyond it. A lane offset that applies only within the removed section is
-/// removed.
+/// Removes a section without length, and extends the previous section. Links into the removed section lead to the
+/// section beyond it. A lane offset that applies only within the removed section is removed.
 void bridge_section(std::size_t index, FileRoad* road);
 
-/// Makes elevation, banking, lane offset and widths constant from s on, instead of extrapolating their cubics. s is the
-/// station where the file's description of the road ends.
+/// Makes elevation, banking, lane offset and widths constant from s on, where the file's description of the road ends.
 void hold_profiles(double s, FileRoad* road);
 
 /// Returns the last section that begins at or before s, or the first section.
 const FileSection& section_at(const FileRoad& road, double s);
 
-/// Splits the section at s, unless s is within 0.5 m of the section's ends. Returns whether the section was split.
+/// Splits the section at s, unless s is within 0.5 m of its ends. Returns whether it did.
 bool split_section(double s, FileRoad* road);
 
-/// Splits sections where the speed limit of the road or of one of its lanes changes, so that each lane has one limit.
-/// Changes within 0.5 m of a section's ends are ignored.
+/// Splits sections where speed limits change, so that each lane has one limit. Ignores changes within 0.5 m of a
+/// section's ends.
 void split_at_speed_changes(Network* network);
 
 }  // namespace pictura::opendrive
