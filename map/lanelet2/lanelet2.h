@@ -1,4 +1,4 @@
-// Imports Lanelet2 (.osm) files as RoadMaps.
+// Importer of Lanelet2 (.osm) files.
 #pragma once
 
 #include <optional>
@@ -12,12 +12,9 @@
 
 namespace pictura {
 
-/// Parses the text of a Lanelet2 file. `source` is the file's name in messages. The file coordinates are those of the
-/// tags local_x and local_y if the file has them, else UTM coordinates in metres. With `origin`, they are UTM
-/// coordinates minus those of the origin. Faults that have only one sensible meaning are repaired and recorded in
-/// `RoadMap::mends`. For all other faults, and for any fault if options.strict is set, throws Error naming source, line
-/// and element. In an affine copy (options.plan), widths of lanes are stretched too. docs/reference/lanelet2.md lists
-/// the elements that are read.
+/// Parses a Lanelet2 file; repairs and throws as parse_opendrive() does. File coordinates are those of place_nodes().
+/// Affine copies (options.plan) also stretch the widths of lanes. docs/reference/lanelet2.md lists the elements that
+/// are read.
 RoadMap parse_lanelet2(std::string_view text, const std::string& source, const OpenDriveOptions& options = {},
                        const std::optional<GeoPoint>& origin = std::nullopt, const ImportProgress& progress = {});
 

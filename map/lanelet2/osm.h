@@ -1,5 +1,4 @@
-// Contents of a Lanelet2 file: nodes (points), ways (lines) and relations, as in OpenStreetMap's XML. Ids and numbers
-// are checked, and references are resolved. Indices refer to the vectors of the same OsmFile.
+// Contents of a Lanelet2 file, as in OpenStreetMap's XML. Indices refer to the vectors of the same OsmFile.
 #pragma once
 
 #include <cstddef>
@@ -21,15 +20,14 @@
 
 namespace pictura::lanelet2 {
 
-/// Returns true for texts that Lanelet2 reads as true, false for texts that it reads as false, and nullopt for all
-/// others.
+/// Returns the truth value that Lanelet2 reads, or nullopt for other texts.
 std::optional<bool> flag_of(std::string_view value);
 
-/// Keys and values of an element, in the order of the file. Tags point into the document, which must outlive them.
+/// Tags of an element, in the order of the file. The document must outlive them.
 class Tags {
  public:
   void add(std::string_view key, std::string_view value) { tags_.emplace_back(key, value); }
-  /// Returns the value of the first tag with that key; empty if no tag has it.
+  /// Returns the first tag's value, or an empty text.
   std::string_view of(std::string_view key) const;
   bool has(std::string_view key) const { return !of(key).empty(); }
   std::optional<bool> flag(std::string_view key) const { return flag_of(of(key)); }
@@ -50,14 +48,14 @@ struct Node {
   std::string_view mgrs;           // tag mgrs_code, or empty
   DashMark dash = DashMark::none;
   bool has_position = false;
-  Eigen::Vector3d position_m{0, 0, 0};  // in the map's file coordinates; set by place_nodes()
+  Eigen::Vector3d position_m{0, 0, 0};  // file coordinates of the map; set by place_nodes()
 };
 
 struct Way {
   int64_t id = 0;
   std::ptrdiff_t offset = 0;
   Tags tags;
-  std::vector<int32_t> nodes;  // at least two nodes, all with positions
+  std::vector<int32_t> nodes;  // at least two, all with positions
 };
 
 struct Relation {
@@ -66,11 +64,11 @@ struct Relation {
   Tags tags;
   struct Member {
     std::string_view role;
-    int32_t way = -1, relation = -1;  // one of the two; the other is -1
+    int32_t way = -1, relation = -1;  // the unused one is -1
   };
   std::vector<Member> members;
 
-  /// Returns the ways with that role, in the order of the file.
+  /// Returns ways in the order of the file.
   std::vector<int32_t> ways(std::string_view role) const;
   std::vector<int32_t> relations(std::string_view role) const;
 };
@@ -81,11 +79,11 @@ struct OsmFile {
   std::vector<Node> nodes;
   std::vector<Way> ways;
   std::vector<Relation> relations;
-  std::string geo_reference;  // geographic reference of the coordinates, a PROJ string; may be empty
+  std::string geo_reference;  // PROJ string; may be empty
 
   opendrive::SourceLocation where(const Node& node) const { return place("node", "node", node); }
   opendrive::SourceLocation where(const Way& way) const { return place("way", "way", way); }
-  /// Returns a location whose owner is the relation's kind and id, such as "lanelet 12".
+  /// The owner is the relation's kind and id, such as "lanelet 12".
   opendrive::SourceLocation where(const Relation& relation) const;
 
  private:
@@ -95,19 +93,18 @@ struct OsmFile {
   }
 };
 
-/// Reads `text`. `name` is the file's name in messages. Repairs the faults that docs/reference/lanelet2.md lists.
-/// Throws Error, which names file, line and element, for all other faults.
+/// `name` is the file's name in messages. Repairs the faults that docs/reference/lanelet2.md lists. Throws Error, which
+/// names file, line and element, for other faults.
 void read_osm(std::string_view text, const std::string& name, opendrive::Faults* faults, OsmFile* file_out);
 
-/// Sets the positions of all nodes and the geographic reference, and removes nodes without a position from ways. With
-/// `origin`, positions are UTM coordinates minus those of the origin. Without it, positions are local coordinates if
-/// any node has them, else UTM coordinates in the zone of the first node. Finally, transforms the positions by `plan`,
-/// which makes an affine copy of a map (map/plan_map.h).
+/// Sets positions and the geographic reference, and removes nodes without a position from ways. Positions are UTM
+/// coordinates minus those of `origin`. Without `origin`, they are the local coordinates if any node has them, else UTM
+/// coordinates in the first node's zone. `plan` then transforms the positions.
 void place_nodes(const std::optional<GeoPoint>& origin, const PlanMap& plan, opendrive::Faults* faults,
                  OsmFile* file_inout);
 
-/// Parses a speed limit like "50", "50 km/h", "25 mph" or "13.9 m/s", and returns it in m/s. A number without a unit is
-/// in km/h. Returns nullopt for other texts, and for speeds that cannot be a limit.
+/// Parses a speed limit like "50", "50 km/h", "25 mph" or "13.9 m/s". The default unit is km/h. Returns nullopt for
+/// other texts and implausible speeds.
 std::optional<double> parse_speed_mps(std::string_view text);
 
 }  // namespace pictura::lanelet2
