@@ -1,4 +1,4 @@
-// Cross-sections of roads, and the lane sections that are made from them.
+// Cross-sections of roads, and lane sections made from them.
 #pragma once
 
 #include <optional>
@@ -10,13 +10,13 @@ namespace pictura::town {
 enum class LaneKind { median, driving, slip, parking, shoulder, sidewalk };
 
 /// One side of a road. Lanes from the reference line outwards: half of a median, driving lanes, a slip lane (for right
-/// turns), a parking bay, a shoulder and a sidewalk. All but the driving lanes are optional.
+/// turns), a parking bay, a shoulder and a sidewalk.
 struct Side {
   int driving = 1;
   bool has_median = false, has_slip = false, has_parking = false, has_shoulder = true, has_sidewalk = true;
 
-  /// Returns the position of the lane of this kind, counted from 1 at the reference line; 0 if there is none. `index`
-  /// selects among the driving lanes.
+  /// Returns the position of a lane, counted from 1 at the reference line, or 0 without such a lane. `index` selects a
+  /// driving lane.
   int rank(LaneKind kind, int index = 0) const;
   /// Returns the index of the driving lane at a position.
   int index_at(int rank) const { return rank - 1 - (has_median ? 1 : 0); }
@@ -32,21 +32,18 @@ struct SectionStyle {
 
   bool in_junction = false;
   bool one_way = false;  // no left side
-  // Width of driving lanes at the start, in the middle and at the end of the section. Slip lanes have the first width
-  // everywhere.
+  // Widths of driving lanes along the section. Slip lanes have the first width.
   double driving_from_m, driving_middle_m, driving_to_m;
 };
 
-// Parking bays begin and end at the distance kParkingLead_m from the ends of their section, and widen and narrow over
-// the length kParkingTaper_m.
+// Distance of parking bays from the ends of their section, and length over which they widen and narrow.
 inline constexpr double kParkingLead_m = 4, kParkingTaper_m = 4;
 
-/// Makes a section's lanes, with widths and marks but without links. Slip lanes open towards the section's end on the
-/// right side, and towards its start on the left side.
+/// Makes a section's lanes without links. Slip lanes open towards the section's end on the right, and towards its start
+/// on the left.
 opendrive::FileSection make_section(double s, double end, const Side& left, const Side& right,
                                     const SectionStyle& style);
 
-/// Links the lanes of two consecutive sections of a road.
 void link_sections(opendrive::FileSection* before, const Side& before_left, const Side& before_right,
                    opendrive::FileSection* after, const Side& after_left, const Side& after_right);
 

@@ -6,14 +6,12 @@
 namespace pictura::town {
 
 inline constexpr double kMaxGrade = 0.075;
-// Fraction of a street's length over which the grade rises from 0. Over the same fraction at the street's end, it falls
-// to 0.
+// Fraction of a street's length at each end over which the grade changes.
 inline constexpr double kVerticalCurveFraction = 0.25;
 
-/// Maximum height difference of a street of this length.
 inline double max_climb_m(double length_m) { return kMaxGrade * (1 - kVerticalCurveFraction) * length_m; }
 
-/// Returns a profile that is level at both ends, from one height to another: a parabola, a constant grade, a parabola.
+/// Returns a parabola, a constant grade and a parabola, level at both ends.
 inline opendrive::Profile elevation_profile(double from_m, double to_m, double length_m) {
   if (from_m == to_m) return {{{0, from_m, 0, 0, 0}}};
   const double curve = kVerticalCurveFraction * length_m;

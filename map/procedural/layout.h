@@ -1,5 +1,4 @@
-// Layout of a town: crossings on a jittered grid, the streets between them, and the features of each. Layout makes all
-// random decisions, before any road is built.
+// Layout of a town: crossings on a jittered grid, and streets between them. Makes all random decisions.
 #pragma once
 
 #include <vector>
@@ -10,12 +9,10 @@
 
 namespace pictura::town {
 
-// Dimensions of streets.
-inline constexpr double kMinStreetRadius_m = 30;  // curves may be tighter next to the fifth arm of a crossing
+inline constexpr double kMinStreetRadius_m = 30;  // except next to the fifth arm of a crossing
 inline constexpr double kShoulderWidth_m = 0.5, kSidewalkWidth_m = 2.5, kParkingWidth_m = 2.3, kHalfMedian_m = 1;
 
-/// Eight directions of arms, counter-clockwise from east. Streets of the grid have even directions, and diagonals have
-/// odd directions.
+/// Directions of arms, counter-clockwise from east. Diagonals have odd directions.
 inline constexpr int kNumDirections = 8;
 inline constexpr int kStepX[kNumDirections] = {1, 1, 0, -1, -1, -1, 0, 1};
 inline constexpr int kStepY[kNumDirections] = {0, 1, 1, 1, 0, -1, -1, -1};
@@ -26,25 +23,24 @@ struct Arm {
   int street = -1;
   int direction = 0;
   bool at_start = false;                            // the street starts here
-  bool has_arrivals = true, has_departures = true;  // whether traffic arrives at the node, or leaves it, on this arm
-  double heading = 0;                               // heading of the reference line, away from the node
-  double mouth_m = 0;                               // distance from the node to the end of the street
+  bool has_arrivals = true, has_departures = true;  // traffic arrives at the node, or leaves it
+  double heading = 0;                               // heading away from the node
+  double mouth_m = 0;                               // distance from the node to the street's end
 };
 
-/// Kind of a node. At a fork, one carriageway of a motorway has an exit (its outermost lane becomes a ramp), and the
-/// other has an entry (a ramp becomes its outermost lane).
+/// At a fork, one carriageway of a motorway has an exit to a ramp, and the other has an entry.
 enum class NodeKind { crossing, roundabout, overpass, fork };
 
-/// Kind of a street. Connectors lead from the town to its motorway. Ramps are one-way, from Street::from to Street::to.
+/// Connectors lead from the town to its motorway. Ramps are one-way.
 enum class StreetKind { street, avenue, connector, ramp, motorway };
 
 struct Node {
   Eigen::Vector2d position_m{0, 0};
   double z = 0;        // height of the junction, or of the lower street of an overpass
-  double upper_z = 0;  // height of the upper street of an overpass
+  double upper_z = 0;  // upper street of an overpass
   NodeKind kind = NodeKind::crossing;
-  bool on_border = false;         // whether the node is on the border of the grid
-  bool upper_runs_north = false;  // whether the upper street of an overpass runs north, not east
+  bool on_border = false;
+  bool upper_runs_north = false;  // else it runs east
   bool has_lights = false, far_side_heads = false, has_crosswalks = false;
   std::vector<Arm> arms;  // counter-clockwise
 
@@ -54,40 +50,40 @@ struct Node {
   bool is_crossing() const { return kind == NodeKind::crossing && degree() > 2; }
 };
 
-/// A street between two nodes. `leave` and `arrive` are its headings at its start and its end.
+/// A street between two nodes. `leave` and `arrive` are its headings at both ends.
 struct Street {
   int from = 0, to = 0;
-  int direction = 0, end_direction = 0;  // directions of the arms at `from` and at `to`
+  int direction = 0, end_direction = 0;  // arm directions at `from` and at `to`
   StreetKind kind = StreetKind::street;
   int lanes = 1;  // in each direction
   double lane_width_m = 0;
   bool is_present = true, has_sidewalks = true;
   bool parks_left = false, parks_right = false;
-  bool slip_at_start = false, slip_at_end = false;  // right-turn lane for traffic that arrives at that end
+  bool slip_at_start = false, slip_at_end = false;  // right-turn lane for traffic that arrives there
   double leave = 0, arrive = 0;
   double start_offset_m = 0, end_offset_m = 0;  // shift of each end to the right
   Curve curve;
   double length_m = 0;
 };
 
-/// Distance from the street's reference line to the left border of lane `lane`, counted from 0.
+/// Distance from the reference line to the left border of a lane.
 inline double lane_offset_m(const Street& street, int lane) {
   return (street.kind == StreetKind::motorway ? kHalfMedian_m : 0) + lane * street.lane_width_m;
 }
 
-/// Nodes of a motorway at an interchange, in the order in which the inner carriageway passes them.
+/// Nodes in the order in which the inner carriageway passes them.
 struct Interchange {
   int entry_fork = -1, overpass = -1, exit_fork = -1;
 };
 
-/// Pose of the end of a street at the distance `mouth_m` from the node, heading away from the node.
+/// Pose of the end of a street, heading away from the node.
 inline Pose mouth_pose(const Node& node, const Arm& arm, const Street& street, double mouth_m) {
   const Pose on_ray = moved_forward({node.position_m, arm.heading}, mouth_m);
   return offset_right(on_ray, arm.at_start ? street.start_offset_m : -street.end_offset_m);
 }
 
-/// Radius of the left border of a right turn between two arms whose headings differ by `gap_rad`. The turn is wide, but
-/// so close to the corner that no gap in the road surface remains between the turn and the other lanes of the junction.
+/// Radius of the left border of a right turn between arms whose headings differ by `gap_rad`. The turn is wide, but
+/// leaves no gap in the junction's surface.
 double right_turn_radius_m(double gap_rad, double lane_width_m);
 
 class Layout {
@@ -99,16 +95,14 @@ class Layout {
   const std::vector<Node>& nodes() const { return nodes_; }
   const std::vector<Street>& streets() const { return streets_; }
 
-  /// Returns the height at the start or the end of a street.
   double end_height_m(int street, bool at_start) const;
-  /// Whether traffic that arrives on this arm has a separate right-turn lane (slip lane).
+  /// Whether traffic that arrives on this arm has a right-turn lane (slip lane).
   bool has_slip(const Arm& arm) const;
-  /// Returns the maximum number of lanes in one direction over the arms of a node. The circle of a roundabout has this
-  /// number of lanes.
+  /// Returns the maximum number of lanes per direction, which a roundabout's circle has.
   int max_lanes_of(const Node& node) const;
 
  private:
-  /// Purposes of random draws; each purpose has its own stream.
+  /// Purposes of random draws, each with its own stream.
   enum DrawPurpose : uint32_t {
     kSpacing,
     kJitter,
@@ -160,10 +154,8 @@ class Layout {
     return RandomStream(
         {.seed = options_.seed, .world = static_cast<uint32_t>(index), .episode = purpose, .purpose = Purpose::town});
   }
-  /// Selects the given fraction of the candidates at random. Selects at least one candidate, unless the fraction is 0
-  /// or there are none.
+  /// Selects a fraction of the candidates at random, at least one unless the fraction is 0.
   std::vector<int> pick(double fraction, std::vector<int> candidates, uint32_t purpose) const;
-  /// Returns all candidates in random order.
   std::vector<int> shuffled(std::vector<int> candidates, uint32_t purpose) const;
 
   int node_at(int column, int row) const { return row * (options_.blocks_x + 1) + column; }

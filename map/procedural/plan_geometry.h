@@ -1,4 +1,4 @@
-// Reference lines in plan (without height): lines and arcs from one pose to another, in double precision.
+// Reference lines in plan: lines and arcs from one pose to another.
 #pragma once
 
 #include <algorithm>
@@ -30,12 +30,12 @@ inline Pose offset_right(const Pose& p, double distance_m) {
 }
 inline Pose reversed(const Pose& p) { return {p.position_m, p.heading + kPi_rad}; }
 
-/// z component of the cross product of two vectors in the plane.
+/// z component of the cross product.
 inline double cross_of(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-/// Wraps an angle to [-pi, pi].
+/// Wraps to [-pi, pi].
 inline double wrap_to_pi(double angle_rad) { return std::remainder(angle_rad, 2 * kPi_rad); }
-/// Wraps an angle to [0, 2 pi).
+/// Wraps to [0, 2 pi).
 inline double wrap_to_2pi(double angle_rad) {
   const double angle = wrap_to_pi(angle_rad);
   return angle < 0 ? angle + 2 * kPi_rad : angle;
@@ -47,7 +47,7 @@ inline opendrive::GeometryPiece piece_of(const Pose& start, double length_m, dou
   return {0, start.position_m.x(), start.position_m.y(), wrap_to_pi(start.heading), length_m, curvature, curvature, {}};
 }
 
-/// Sets the stations (arc lengths from the start) of the pieces, and returns the curve's length.
+/// Sets the stations, and returns the curve's length.
 inline double assign_stations(Curve* curve) {
   double s = 0;
   for (opendrive::GeometryPiece& piece : *curve) {
@@ -63,7 +63,7 @@ inline double max_curvature(const Curve& curve) {
   return sharpest;
 }
 
-/// Returns the arc or line that leaves `from` along its heading and ends at `to_m`.
+/// Returns the arc or line from `from` to `to_m`.
 inline opendrive::GeometryPiece arc_to(const Pose& from, const Eigen::Vector2d& to_m) {
   const Eigen::Vector2d apart = to_m - from.position_m;
   const double chord = hypot_of(apart.x(), apart.y());
@@ -73,8 +73,7 @@ inline opendrive::GeometryPiece arc_to(const Pose& from, const Eigen::Vector2d& 
   return piece_of(from, chord * half_turn / std::sin(half_turn), 2 * std::sin(half_turn) / chord);
 }
 
-/// Returns a biarc: two arcs with a common tangent and equal control arms. Returns a single piece if both arcs have the
-/// same curvature.
+/// Returns two arcs with a common tangent and equal control arms, or a single arc.
 inline Curve biarc(const Pose& from, const Pose& to) {
   const Eigen::Vector2d leaving = direction_of(from.heading), arriving = direction_of(to.heading);
   const Eigen::Vector2d chord = to.position_m - from.position_m;
@@ -90,18 +89,17 @@ inline Curve biarc(const Pose& from, const Pose& to) {
   return {first, second};
 }
 
-inline constexpr double kNoRadiusLimit_m = 1e9;  // value of max_radius_m without a limit
+inline constexpr double kNoRadiusLimit_m = 1e9;  // for max_radius_m
 
-/// Returns a fillet: a line, an arc and a line, tangent to each other. The radius is as large as fits, but at most
-/// `max_radius_m`. Returns a biarc instead if the turn is less than 0.1 rad, or if the tangents at the poses do not
-/// intersect between the poses.
+/// Returns a line, an arc and a line, tangent to each other, with the largest radius up to `max_radius_m`. Returns a
+/// biarc if the turn is less than 0.1 rad, or if the tangents do not intersect between the poses.
 inline Curve fillet(const Pose& from, const Pose& to, double max_radius_m) {
   constexpr double kMinTurn_rad = 0.1, kMinLine_m = 1e-7;
   const double turn = wrap_to_pi(to.heading - from.heading);
   if (std::abs(turn) < kMinTurn_rad) return biarc(from, to);
   const double sine = std::sin(turn);
   const Eigen::Vector2d chord = to.position_m - from.position_m;
-  // Distances from both ends to the intersection of their tangents.
+  // Distances from both ends to the tangents' intersection.
   const double lead_in = cross_of(chord, direction_of(to.heading)) / sine;
   const double lead_out = cross_of(direction_of(from.heading), chord) / sine;
   if (lead_in <= 0 || lead_out <= 0) return biarc(from, to);

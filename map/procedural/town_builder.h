@@ -1,4 +1,4 @@
-// Builds a town from its Layout: a Network with roads, lanes, links, junctions, lights and objects.
+// Builds a town's Network from its Layout.
 #pragma once
 
 #include <string>
@@ -13,13 +13,11 @@
 
 namespace pictura::town {
 
-/// One end of a road of the network.
 struct RoadEnd {
   int road = -1;
   bool at_start = false;
 };
 
-/// The two sides of a road at one of its ends.
 struct EndSides {
   Side left, right;
 };
@@ -44,28 +42,28 @@ class TownBuilder {
                   opendrive::FileJunction* junction);
 
   const Street& street_of(const Arm& arm) const { return layout_.streets()[arm.street]; }
-  /// Returns the road end of an arm. The network's first roads are the streets of the layout, in the same order.
+  /// The network's first roads are the layout's streets, in the same order.
   static RoadEnd end_of(const Arm& arm) { return {arm.street, arm.at_start}; }
   Pose mouth_of(const Node& node, const Arm& arm) const { return mouth_pose(node, arm, street_of(arm), arm.mouth_m); }
 
-  /// Adds a road with one section and returns the road's index. The left side is ignored for one-way roads.
+  /// Adds a road with one section. One-way roads ignore `left`.
   int add_road(Curve curve, double height_m, const std::string& junction, double speed_mps, const Side& left,
                const Side& right, const SectionStyle& style);
   EndSides& sides_at(RoadEnd end) { return end_sides_[2 * end.road + (end.at_start ? 0 : 1)]; }
-  /// Returns the side of a road on which traffic arrives at this end (if `arriving`) or leaves it.
+  /// Returns the side on which traffic arrives at this end, or leaves it.
   const Side& side(RoadEnd end, bool arriving) {
     return arriving == end.at_start ? sides_at(end).left : sides_at(end).right;
   }
-  /// Returns the id of a lane on the side (end, arriving), or 0 if there is no such lane.
+  /// Returns a lane's id, or 0 if there is no such lane.
   int lane_id(RoadEnd end, bool arriving, LaneKind kind, int index = 0) {
     return side(end, arriving).rank(kind, index) * (arriving == end.at_start ? 1 : -1);
   }
   void set_lane_link(RoadEnd end, int lane, int other);
   void set_road_link(RoadEnd end, RoadEnd other);
   void set_junction_link(RoadEnd end, const std::string& junction);
-  /// Links two road ends with each other, lane by lane, in both directions.
+  /// Links two road ends lane by lane, in both directions.
   void join(RoadEnd a, RoadEnd b);
-  /// Connects the movement's lanes at `from` to those at `to` through the road `connecting`, which begins at `from`.
+  /// Connects the movement's lanes at `from` to those at `to`. The road `connecting` begins at `from`.
   void connect(RoadEnd from, int connecting, RoadEnd to, const Movement& movement, opendrive::FileJunction* junction);
   void finish_junction(opendrive::FileJunction junction);
 
@@ -75,12 +73,11 @@ class TownBuilder {
   const Layout& layout_;
   opendrive::Network network_;
   std::vector<EndSides> end_sides_;  // [roads][start, end]
-  int next_id_ = 1000000;            // next id of elements other than roads
+  int next_id_ = 1000000;            // for elements other than roads
 };
 
 inline constexpr double mph(double speed) { return speed * 0.44704; }
 inline constexpr double kJunctionSpeed_mps = mph(20), kRoundaboutSpeed_mps = mph(15), kMotorwayBendSpeed_mps = mph(45);
-/// Speed limit of a street.
 constexpr double speed_mps(StreetKind kind) {
   switch (kind) {
     case StreetKind::street: return mph(25);
