@@ -1,5 +1,4 @@
-// Stages of make_scenario() in the order of execution; it converts a LoggedScene to a Scenario. Each stage fills its
-// own parts of the scenario, and may read parts of earlier stages. docs/reference/scenario.md lists the rules.
+// Stages of make_scenario(), in the order of execution. docs/reference/scenario.md lists the rules.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +16,7 @@
 
 namespace pictura::conversion {
 
-/// Minimum distance between successive points; closer points are duplicates.
+/// Closer successive points are duplicates.
 constexpr double kSamePoint_m = 0.01;
 
 struct Conversion {
@@ -26,16 +25,15 @@ struct Conversion {
   Eigen::Vector3d origin{0, 0, 0};
   std::vector<std::size_t> logged_lane{};             // [map.lanes] index into scene.lanes
   std::unordered_map<int64_t, int32_t> lane_of_id{};  // index into map.lanes
-  int64_t remaining_work = 400'000'000;               // steps left for all loops whose length depends on a file
+  int64_t remaining_work = 400'000'000;               // steps left for loops whose length depends on a file
 
-  /// Counts `amount` steps of work, so that no file can take minutes. Throws Error at the limit.
+  /// Throws Error at the limit, so that no file can take minutes.
   void count_work(std::size_t amount) {
     remaining_work -= static_cast<int64_t>(amount);
     if (remaining_work < 0) fail("{}: its map exceeds the work limit of a scene", scene.source);
   }
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const { return p - origin; }
-  /// Rounds a point to the precision of a map if a program wrote the scene (is_authored). So scene_of_scenario() later
-  /// returns the same point.
+  /// Rounds points of authored scenes as a map does, so that scene_of_scenario() returns the same points.
   Eigen::Vector3d rounded(const Eigen::Vector3d& p) const {
     if (!scene.is_authored) return p;
     const Eigen::Vector3d stated_again = origin + p.cast<float>().cast<double>();
@@ -43,18 +41,16 @@ struct Conversion {
   }
 };
 
-/// Removes duplicate points, and inserts points so that no piece is too long. Points are relative to the origin. `what`
-/// is the line's name in notes.
+/// Removes duplicate points, and inserts points so that no piece is too long. `what` is the line's name in notes.
 std::vector<CurvePoint> cut_into_pieces(Conversion* conversion, const std::vector<CurvePoint>& points,
                                         const std::string& what);
 
-/// Returns a line through the points, relative to the origin, cut into pieces and thinned. Returns an empty line if
-/// there are fewer than two points. Throws Error, which names `what`, if a point is too far from the origin.
+/// Returns a line relative to the origin, cut into pieces and thinned. The line is empty if there are fewer than two
+/// points. Throws Error, which names `what`, if a point is too far from the origin.
 std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& points, const std::vector<double>& widths,
                                   const std::string& what);
 
-/// Sets the origin to the centre of the bounding box of lanes and edges, in whole metres, unless the scene has an
-/// origin.
+/// Sets the origin to the centre of lanes and edges, in whole metres, unless the scene has an origin.
 void choose_origin(Conversion* conversion);
 void make_lanes(Conversion* conversion);
 void link_lanes(Conversion* conversion);

@@ -1,5 +1,5 @@
-// Faults inside a record of a scene file. Readers throw the innermost field's name, and add the names of enclosing
-// fields while the exception propagates. So messages have the full path, and valid files cause no overhead.
+// Faults in a record of a scene file. Readers throw the innermost field's name. Callers prefix the names of enclosing
+// fields while the exception propagates.
 #pragma once
 
 #include <cmath>
@@ -13,13 +13,13 @@
 
 namespace pictura {
 
-/// Exception for a fault of a field; to_error() converts it to an Error.
+/// Fault of a field, which to_error() converts to an Error.
 struct FieldError {
-  std::string path;    // "tracks[4].states[17].center_x", or empty for the record itself
+  std::string path;    // "tracks[4].states[17].center_x"; empty for the record itself
   std::string reason;  // "expected a finite number, got nan"
 };
 
-/// Returns the Error "SOURCE: PATH: REASON".
+/// Returns "SOURCE: PATH: REASON".
 inline Error to_error(const std::string& source, const FieldError& error) {
   return Error(error.path.empty() ? fmt::format("{}: {}", source, error.reason)
                                   : fmt::format("{}: {}: {}", source, error.path, error.reason));
@@ -30,7 +30,7 @@ template <typename... Args>
   throw FieldError{std::string(field), fmt::format(format, std::forward<Args>(args)...)};
 }
 
-/// Returns work(). If it throws FieldError, prefixes the error's path with "NAME.".
+/// Returns work(), and prefixes the paths of FieldErrors with "NAME.".
 template <typename Work>
 auto within(std::string_view name, Work&& work) {
   try {
@@ -42,7 +42,7 @@ auto within(std::string_view name, Work&& work) {
   }
 }
 
-/// Returns work(). If it throws FieldError, prefixes the error's path with "NAME[INDEX].".
+/// Returns work(), and prefixes the paths of FieldErrors with "NAME[INDEX].".
 template <typename Work>
 auto within(std::string_view name, std::size_t index, Work&& work) {
   try {
@@ -54,7 +54,7 @@ auto within(std::string_view name, std::size_t index, Work&& work) {
   }
 }
 
-/// Returns the number. Throws FieldError if it is not finite or exceeds `largest` in magnitude.
+/// Throws FieldError if the number is not finite or exceeds `largest` in magnitude.
 inline double checked_number(std::string_view field, double value, double largest = 1e9) {
   if (!std::isfinite(value)) fail_field(field, "expected a finite number, got {}", value);
   if (std::abs(value) > largest) {

@@ -1,5 +1,5 @@
-// A recorded scene with the contents of its file, in the file's coordinates and in double precision. All readers fill
-// this structure, and make_scenario() converts it, so that each rule of conversion exists only once.
+// Contents of a recorded scene's file, in the file's coordinates. All readers fill this structure, and make_scenario()
+// converts it.
 #pragma once
 
 #include <cstdint>
@@ -20,13 +20,13 @@ using LoggedPoints = std::vector<Eigen::Vector3d>;
 
 enum class LoggedLaneType : uint8_t { undefined, freeway, surface, bike, bus };
 
-/// Part of a lane's border: `feature` is the border along the points [begin, end] of the lane's centre line.
+/// Part of a lane's border: `feature` is the border along points [begin, end] of the lane's centre line.
 struct LoggedBoundary {
   int32_t begin = 0, end = 0;
   int64_t feature = 0;  // id of a line or an edge
 };
 
-/// A neighbour of a lane: `lane` is beside the points [begin, end] of the lane's centre line.
+/// `lane` is beside points [begin, end] of the lane's centre line.
 struct LoggedNeighbor {
   int32_t begin = 0, end = 0;
   int64_t lane = 0;
@@ -35,11 +35,11 @@ struct LoggedNeighbor {
 struct LoggedLane {
   int64_t id = 0;
   LoggedLaneType type = LoggedLaneType::undefined;
-  std::optional<LaneType> map_type;  // overrides `type` if a program wrote the scene
+  std::optional<LaneType> map_type;  // overrides `type` in authored scenes
   double speed_limit_mps = 0;        // 0: unknown
   bool interpolating = false;        // connects two lanes in a junction
   LoggedPoints points;
-  std::vector<double> widths_m;  // [points], or empty: unknown
+  std::vector<double> widths_m;  // [points]; empty: unknown
   std::vector<int64_t> entries, exits;
   std::vector<LoggedNeighbor> left_neighbors, right_neighbors;
   std::vector<LoggedBoundary> left_boundaries, right_boundaries;
@@ -55,7 +55,7 @@ enum class LoggedLineType : uint8_t {
   solid_single_yellow,
   solid_double_yellow,
   passing_double_yellow,
-  dash_white,  // a single dash as long as the line
+  dash_white,  // a dash as long as the line
   dash_yellow,
 };
 
@@ -96,7 +96,7 @@ struct LoggedTrack {
   std::vector<LoggedState> states;  // [num_steps]
 };
 
-/// A traffic light for some lanes. If it has no stop line, it gets a stop line across the starts of its lanes.
+/// A missing stop line is placed across the starts of the lanes.
 struct LoggedLight {
   std::vector<int64_t> lanes;
   bool has_stop_line = false;
@@ -104,14 +104,14 @@ struct LoggedLight {
   std::vector<RecordedLightState> states;  // [num_steps]
 };
 
-/// Names that messages use for the fields of a file format.
+/// Names of a format's fields in messages.
 struct LoggedNames {
   const char* tracks = "tracks";
   const char* features = "map_features";
 };
 
 struct LoggedScene {
-  std::string source;  // "FILE: record 3 (scenario abc)", for messages
+  std::string source;  // in messages: "FILE: record 3 (scenario abc)"
   LoggedNames names;
   std::string id, name, format;
   double dt_s = 0.1;
@@ -127,16 +127,15 @@ struct LoggedScene {
   std::vector<LoggedStopSign> stop_signs;
   std::vector<LoggedLight> lights;
   bool has_links = true;  // if false, lanes are linked where their ends meet
-  /// Whether the scene is the work of a program, not a recording. In such a scene, nothing is inferred. Types of lanes,
-  /// directions of links, sides and gaps of edges, and the grouping of lights are used as they are. Points are rounded
-  /// to the precision of a map. So the scenario does not change if scene_of_scenario() and make_scenario() are applied
-  /// to it.
+  /// Whether a program wrote the scene. Then nothing is inferred: types, links, edges and groups of lights are used as
+  /// they are. Points are rounded to the precision of a map, so scene_of_scenario() followed by
+  /// make_scenario() returns the same scenario.
   bool is_authored = false;
-  double tolerance_m = 0.02;                // maximum deviation of thinned polylines; 0: all points are kept
-  std::optional<Eigen::Vector3d> origin_m;  // origin of the map; by default the centre of lanes and edges
+  double tolerance_m = 0.02;                // maximum deviation of thinned polylines; 0: no thinning
+  std::optional<Eigen::Vector3d> origin_m;  // by default the centre of lanes and edges
   std::vector<ConversionNote> notes;
 
-  /// Counts an occurrence of `what`, and records the place of the first occurrence.
+  /// Counts `what`, and records the first occurrence's place.
   void note(const std::string& what, const std::string& place) {
     for (ConversionNote& known : notes) {
       if (known.what == what) {
@@ -148,15 +147,14 @@ struct LoggedScene {
   }
 };
 
-/// Converts a scene to a scenario. Throws Error "SOURCE: FIELD: expected ..., got ..." if a valid state or a point of
-/// the map is not finite or is more than 10 km from the scene's centre. Also throws Error if no lane has at least two
-/// points, if there is no track, or if the map would need more points than the limit for scenes.
+/// Throws Error "SOURCE: FIELD: expected ..., got ..." for data that a Scenario cannot hold. Examples are points that
+/// are not finite or are more than 10 km from the centre, and scenes without lanes or tracks.
 Scenario make_scenario(LoggedScene scene);
 
-/// Inverse of make_scenario(), except for data that a LoggedScene cannot hold: walls, parking spaces, painted stop
-/// lines, signs other than stop signs, widths of marks, marks that are neither white nor yellow, the traffic lights of
-/// the map itself, and SavedMotion. A double line becomes two stripes, and a broken line becomes its dashes. Lanes have
-/// the ids of the file if these are unique, else their indices.
+/// Inverse of make_scenario(), except for data that a LoggedScene lacks: walls, parking spaces, painted stop lines,
+/// signs except stop signs, the map's own lights, SavedMotion, widths of marks, and mark colours except white and
+/// yellow. Double lines become two stripes, and broken lines become dashes. Lanes keep the ids of the file if these are
+/// unique.
 LoggedScene scene_of_scenario(const Scenario& scenario);
 
 }  // namespace pictura

@@ -1,5 +1,4 @@
-// The side of the road edges on which a position is. This rule defines the drivable area of maps that have road edges
-// but no road surface. Shared by CPU and GPU code.
+// Side of the road edges on which a position is, for maps without road surface. Shared by CPU and GPU code.
 #pragma once
 
 #include "pictura/common/cells_around.h"
@@ -10,18 +9,18 @@ namespace pictura {
 /// An edge with the road on its right.
 struct SideEdge {
   Vec3 a_m, b_m;
-  Vec2 left;                       // unit normal, points away from the road
-  int32_t before = -1, next = -1;  // edges that meet the start and the end of this edge; -1: none
+  Vec2 left;                       // unit normal, away from the road
+  int32_t before = -1, next = -1;  // edges that meet the start and the end; -1: none
 };
 
 struct RoadSide {
-  int32_t edge = -1;       // the nearest edge; -1: none within kRoadSideReach_m
-  float distance_m = 0;    // distance to the edge; differences in height count threefold
+  int32_t edge = -1;       // -1: none within kRoadSideReach_m
+  float distance_m = 0;    // differences in height count threefold
   bool is_on_road = true;  // true if there is no edge
 };
 constexpr float kRoadSideReach_m = 50.0f;
 
-/// Thread group of a single thread. The simulator's rules use groups of several threads, which share the loops.
+/// Thread group of a single thread. Larger groups share the loops.
 struct NoGroup {
   PICTURA_HD static int rank() { return 0; }
   PICTURA_HD static int size() { return 1; }
@@ -31,11 +30,10 @@ struct NoGroup {
   }
 };
 
-/// Returns the side of the nearest edge. If several edges are equally near, the first counts. Differences in height
-/// count threefold, so that the edges of a bridge are not nearest to traffic below the bridge. At a corner, the sum of
-/// both edges' unit normals determines the side. This is right for any angle between the edges (Baerentzen and Aanaes,
-/// Signed distance computation using the angle weighted pseudonormal, 2005). `cells` lists the edges that touch each
-/// grid cell.
+/// Returns the side of the nearest edge, the first one if several are equally near. Differences in height count
+/// threefold, so that a bridge's edges are not nearest to traffic below it. At a corner, the sum of both normals
+/// determines the side (Baerentzen and Aanaes, Signed distance computation using the angle weighted pseudonormal,
+/// 2005). `cells` is a grid of the edges.
 template <typename ThreadGroup = NoGroup>
 PICTURA_HD RoadSide road_side(Span<const SideEdge> edges, const GridView& cells, Vec3 position_m,
                               const ThreadGroup& group = {}) {
@@ -59,7 +57,7 @@ PICTURA_HD RoadSide road_side(Span<const SideEdge> edges, const GridView& cells,
     if (neighbor >= 0) normal = normal + edges[neighbor].left;
     best = {index, distance_m, dot(away, normal) <= 0.0f};
   };
-  // Larger areas are searched only if smaller areas contain no edge, because most edges are near.
+  // Small areas are searched first, because most edges are near.
   const float reaches_m[] = {5.0f, 15.0f, kRoadSideReach_m};
   for (const float reach_m : reaches_m) {
     const CellRows range = cells_around(cells, p, reach_m);

@@ -1,5 +1,4 @@
-// Lists of the fields of Scenario and its elements, for the cache of scenes and for comparisons. map_fields.h lists the
-// fields of RoadMap in the same way. Also contains the limits that importers share with validate().
+// Fields of Scenario and its elements (see map_fields.h), and limits.
 #pragma once
 
 #include "pictura/map/field_difference.h"
@@ -17,7 +16,7 @@ PICTURA_FIELDS(ConversionNote, what, count, first)
 PICTURA_FIELDS(Scenario, id, format, dt_s, num_steps, current_step, sdc_track, map, tracks, states, valid, driven,
                objects_of_interest, tracks_to_predict, lights, light_lanes, light_states, notes, repaired_headings)
 
-/// Maximum distance of positions from a scene's origin. Recordings extend over a few hundred metres.
+/// Maximum distance from a scene's origin.
 constexpr float kMaxScenarioRadius_m = 1e4f;
 constexpr float kMaxTrackSize_m = 100.0f;
 
