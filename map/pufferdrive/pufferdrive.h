@@ -1,7 +1,6 @@
-// Importer of PufferDrive's binary scenes. Their layouts have no magic number or version, so the importer tries each
-// layout and takes the one that fits the file to the last byte. Supported layouts are v1 (of 2025), v2 (of PufferDrive
-// 2.0, with or without a leading scenario id) and v3c (of PufferDrive 3.0, and of 123Drive from version 0.3 on). All
-// are little-endian.
+// Importer of PufferDrive's little-endian scenes: v1 (of 2025), v2 (of PufferDrive 2.0, with or without a leading
+// scenario id) and v3c (of PufferDrive 3.0, and of 123Drive from version 0.3 on). The files have no version, so the
+// importer takes the layout that fits to the last byte.
 #pragma once
 
 #include <string>
@@ -12,8 +11,7 @@
 
 namespace pictura::pufferdrive {
 
-/// Parses the bytes of a scene file. Throws Error if no layout fits. The message names the source and, for each layout,
-/// the first field that does not fit.
+/// Throws Error if no layout fits. For each layout, the message names the first field that does not fit.
 LoggedScene parse_scene(std::string_view bytes, const std::string& source);
 
 }  // namespace pictura::pufferdrive

@@ -1,4 +1,4 @@
-// TFRecord files: records of arbitrary bytes, each with its length and two checksums.
+// TFRecord files: records of bytes, each with its length and two checksums.
 #pragma once
 
 #include <cstdint>
@@ -11,18 +11,16 @@
 
 namespace pictura::womd {
 
-/// Source of bytes with random access: a file or a buffer in memory.
+/// Source of bytes with random access.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
   virtual uint64_t size() const = 0;
-  /// Returns the bytes [offset, offset + count), which must be within size(). Throws Error, which names the file, if
-  /// they cannot be read.
+  /// The bytes must be within size(). Throws Error, which names the file, on failure.
   virtual std::string read(uint64_t offset, std::size_t count) const = 0;
 };
 
-/// Bytes of a regular file. The constructor throws Error, which names the path, for other kinds of files and for files
-/// that cannot be opened.
+/// Bytes of a regular file. The constructor throws Error, which names the path, for other files and on failure.
 class FileBytes : public ByteSource {
  public:
   explicit FileBytes(const std::string& path);
@@ -47,25 +45,24 @@ class MemoryBytes : public ByteSource {
   std::string_view bytes_;
 };
 
-/// Offset, size and checksum of a record's payload.
+/// Place and checksum of a record's payload.
 struct RecordPlace {
   uint64_t offset = 0, bytes = 0;
   uint32_t sum = 0;
 };
 
-/// Maximum size of a record. Recorded scenes have about 1 MB.
 constexpr uint64_t kMaxRecord_bytes = uint64_t{1} << 28;
 
 struct RecordList {
   std::vector<RecordPlace> records;
-  std::string fault;  // reason why the list ends before the end of the file, or empty
+  std::string fault;  // why the list ends early, or empty
 };
 
-/// Lists the records of a file from the records' lengths, and verifies the checksums of the lengths. `name` is the
-/// file's name in RecordList::fault.
+/// Verifies the checksums of the lengths. `name` is the file's name in RecordList::fault.
 RecordList list_records(const ByteSource& source, const std::string& name);
 
-/// Returns the payload of record `k`. Throws Error "NAME: record K: ..." if the payload does not match its checksum.
+/// `k` is the record's number in messages. Throws Error "NAME: record K: ..." if the payload does not match its
+/// checksum.
 std::string read_record(const ByteSource& source, const std::string& name, std::size_t k, RecordPlace place);
 
 }  // namespace pictura::womd

@@ -1,5 +1,4 @@
-// Reader of protobuf's wire format. It reads the fields of one message, in any order, and never beyond the message. It
-// has no schema, and skips unknown fields by their wire type.
+// Reader of protobuf's wire format, without a schema.
 #pragma once
 
 #include <bit>
@@ -14,14 +13,14 @@ namespace pictura::womd {
 
 enum class WireType : uint8_t { varint = 0, fixed64 = 1, bytes = 2, fixed32 = 5 };
 
-/// Reads the fields of a message in sequence. All members throw FieldError if the bytes are not a message. Faults are:
-/// a length or a number beyond the end, a varint of more than ten bytes or 64 bits, a wire type of groups (3, 4), an
-/// undefined wire type (6, 7), and field number 0.
+/// Reads the fields of a message in sequence, and never beyond it. All members throw FieldError if the bytes are not a
+/// message. Faults are a length or number beyond the end, a varint of more than 64 bits, wire types 3, 4, 6 and 7, and
+/// field number 0.
 class WireReader {
  public:
   explicit WireReader(std::string_view message) : rest_(message) {}
 
-  /// Reads the next field. Returns false at the end of the message.
+  /// Returns false at the end of the message.
   bool next() {
     if (rest_.empty()) return false;
     take_tag();
@@ -42,9 +41,8 @@ class WireReader {
     return true;
   }
 
-  /// Reads only the tag and the length of the next field; the field's value may be beyond the bytes of this reader.
-  /// Returns the size of the tag (including the length prefix of a bytes field, or the value of a varint) and the size
-  /// of the remaining value, in bytes.
+  /// Reads only the tag of the next field, whose value may be beyond this reader's bytes. Returns the sizes of the tag
+  /// and of the value, in bytes. A length prefix or a varint belongs to the tag.
   std::pair<std::size_t, uint64_t> next_extent() {
     const std::size_t before = rest_.size();
     take_tag();
@@ -56,30 +54,28 @@ class WireReader {
   uint32_t field() const { return field_; }
   WireType type() const { return type_; }
 
-  // Functions that return the value of the field. They throw FieldError if the field has another wire type.
+  // Values of the field. Throw FieldError if the field has another wire type.
   std::string_view bytes() const { return expect(WireType::bytes), bytes_; }
   double number64() const { return expect(WireType::fixed64), std::bit_cast<double>(number_); }
   float number32() const { return expect(WireType::fixed32), std::bit_cast<float>(static_cast<uint32_t>(number_)); }
   int64_t integer() const { return expect(WireType::varint), static_cast<int64_t>(number_); }
-  /// Returns the low 32 bits of an integer, as protobuf's own readers do for int32 fields.
+  /// Returns the low 32 bits, as protobuf's own readers do.
   int32_t integer32() const { return static_cast<int32_t>(integer()); }
   bool boolean() const { return integer() != 0; }
 
-  /// Calls visit(value) for each value of a repeated integer field, packed or not.
+  /// Calls visit(value) for each value of a repeated field, packed or not.
   template <typename Visit>
   void integers(Visit&& visit) const {
     if (type_ == WireType::varint) return visit(integer());
     WireReader packed(bytes());
     while (!packed.rest_.empty()) visit(static_cast<int64_t>(packed.take_varint()));
   }
-  /// Calls visit(value) for each value of a repeated double field, packed or not.
   template <typename Visit>
   void numbers64(Visit&& visit) const {
     if (type_ == WireType::fixed64) return visit(number64());
     WireReader packed(bytes());
     while (!packed.rest_.empty()) visit(std::bit_cast<double>(packed.take_number<uint64_t>()));
   }
-  /// Calls visit(value) for each value of a repeated float field, packed or not.
   template <typename Visit>
   void numbers32(Visit&& visit) const {
     if (type_ == WireType::fixed32) return visit(number32());
