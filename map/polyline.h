@@ -101,7 +101,7 @@ std::vector<CurvePoint> sample_curve(const CurveBreaks& curve, double tolerance_
   constexpr double kSafety = 0.9;      // far above rounding errors
   const std::vector<double>& breaks = curve.s;
   std::vector<CurvePoint> dense{eval(breaks.front())};
-  double low = 0, high = 0, bend = 0;  // current interval and its bound
+  double low = 0, high = 0, bend = 0;
   auto refine = [&](auto&& self, const CurvePoint& a, const CurvePoint& b, int depth) -> void {
     budget->count_sample();
     if (depth < kMaxDepth) {

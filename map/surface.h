@@ -109,7 +109,6 @@ class Surface {
     return false;
   }
 
-  /// Calls visit(quad) for quads whose bounds contain a position, until a call returns true.
   template <typename Visit>
   bool any_quad_at(const Eigen::Vector2d& p, double z, Visit&& visit) const {
     const GridView grid = grid_.view();

@@ -65,7 +65,6 @@ void build_lanes(Build* build);
 void link_lanes(Build* build);
 void set_speed_limits(Build* build);
 
-/// Builds the outline of the drivable surface.
 void build_road_edges(Build* build);
 
 /// Removes road edges where traffic leaves or enters a map without endless roads, and records missing links.

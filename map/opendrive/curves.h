@@ -42,10 +42,9 @@ struct Station {
   double elevation_m = 0;
 };
 
-/// Cache of the last heading's unit vector, for straight lines.
+/// Cache of (cos, sin) of the last heading, for straight lines.
 class LastDirection {
  public:
-  /// Returns (cos, sin) of the heading.
   const Eigen::Vector2d& of(double heading) {
     if (heading != heading_) {
       heading_ = heading;

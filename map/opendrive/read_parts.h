@@ -14,7 +14,6 @@ inline constexpr double kMaxOffset_m = 1e4, kMaxHeight_m = 1e4;
 /// need it. Returns the s up to which the file describes the road; see hold_profiles().
 double read_reference_line(const Element& road_element, FileRoad* road);
 
-/// Reads <lanes>.
 void read_lanes(const Element& road_element, Faults* faults, FileRoad* road);
 
 std::vector<RoadMark> read_marks(const Element& lane_element, double section_length);
