@@ -24,6 +24,7 @@ struct LoadReport {
 /// TOWN: TOWN.xodr in the map folder
 /// FAMILY[:SEED[:NAME=VALUE,...]]: a procedural town (town_options.h)
 /// MAP#N: the N-th affine copy of MAP (map_copy.h), whose plan replaces options.plan
+///
 /// Caches imported files; ignores an unusable cache. Throws Error, which names file and line or element, for a faulty
 /// file. Throws UsageError for an unknown name.
 std::shared_ptr<const RoadMap> load_map(const std::string& name, const OpenDriveOptions& options = {},

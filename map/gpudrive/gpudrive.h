@@ -9,8 +9,8 @@
 
 namespace pictura::gpudrive {
 
-/// Throws Error "SOURCE: objects[3].position[17].x: expected ..., got ..." if the text is not JSON, a field is missing
-/// or has another type, or a valid state or point is not finite.
+/// Throws Error "SOURCE: objects[3].position[17].x: expected ..., got ..." for faults: text other than JSON, missing
+/// fields, other types, and valid states or points that are not finite.
 LoggedScene parse_scene(std::string_view text, const std::string& source);
 
 }  // namespace pictura::gpudrive

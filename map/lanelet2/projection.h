@@ -38,8 +38,7 @@ struct MgrsPlace {
   GridPoint offset_m;  // within the square
 };
 
-/// Returns nullopt if the text is not a code of zone, band, square and at most ten digits, or if the square does not
-/// exist.
+/// A code has a zone, a band, a square and at most ten digits. Returns nullopt for other texts and unknown squares.
 std::optional<MgrsPlace> parse_mgrs(std::string_view code);
 
 /// Returns the PROJ string for UTM coordinates minus `shift_m`.

@@ -10,8 +10,8 @@
 
 namespace pictura::opendrive {
 
-/// Throws Error, which names source and line, if `text` is not well-formed UTF-8 XML. Also throws Error for unsafe
-/// documents: with a document type, an <include>, more than 64 nested elements, or an attribute of more than 4 KiB.
+/// Throws Error, which names source and line, if `text` is not well-formed UTF-8 XML. Also throws Error for a document
+/// type, an <include>, more than 64 nested elements, and an attribute of more than 4 KiB.
 void read_document(std::string_view text, const Source& source, pugi::xml_document* document_out);
 
 }  // namespace pictura::opendrive
