@@ -5,7 +5,7 @@
 
 namespace pictura {
 
-/// Quotes a text as a CSV field (RFC 4180).
+/// Quotes a text (RFC 4180).
 inline std::string csv_quoted(const std::string& text) {
   std::string result = "\"";
   for (const char c : text) result.append(c == '"' ? 2 : 1, c);

@@ -8,13 +8,13 @@
 
 namespace pictura {
 
-/// Adds an estimate as two keys: `name`, and `name` followed by "_half_width_95".
+/// Adds the keys `name` and `name` + "_half_width_95".
 inline void add_estimate(const std::string& name, const Estimate& estimate, Json* json_out) {
   (*json_out)[name] = finite_or_null(estimate.value);
   (*json_out)[name + "_half_width_95"] = finite_or_null(estimate.half_width_95);
 }
 
-/// Returns the counts and metrics of a row of evaluate(), without its density and driver.
+/// Returns a row's counts and metrics, without density and driver.
 inline Json row_json(const EvaluateRow& row) {
   Json json = {{"scenarios", row.scenarios},
                {"steps", row.steps},

@@ -1,4 +1,4 @@
-// Evaluation of a saved policy, as the Pictura paper defines it. Includes no torch headers.
+// Evaluation of a saved policy as in the Pictura paper.
 #pragma once
 
 #include <array>
@@ -18,26 +18,25 @@ enum class Density { light, medium, dense };
 
 constexpr std::array<const char*, 3> kDensityNames{"light", "medium", "dense"};
 constexpr std::array<int, 3> kDensityAgents{60, 120, 150};
-/// Returns the density of this name. Throws UsageError listing the names.
+/// Throws UsageError listing the names.
 Density density_named(const std::string& name);
 
-/// Global number of the first evaluation world. The numbers of training worlds begin at 0 and never reach this number.
+/// Number of the first evaluation world. Training worlds have smaller numbers.
 constexpr uint32_t kFirstEvaluationWorld = 0x80000000u;
 
-/// Observes the worlds of an evaluation during driving. All batches of worlds run in the same simulator object.
+/// Observes the worlds of an evaluation. All batches of worlds run in the same simulator object.
 class EvaluationObserver : public StepObserver {
  public:
-  /// Called at the start of the worlds' episodes.
   virtual void begin(Simulator& simulator) = 0;
-  /// Called after all worlds of the batch are driven to the end. An interrupt ends the batch without this call.
+  /// Called after all worlds of a batch are complete. Not called after an interrupt.
   virtual void end() {}
 };
 
 struct EvaluateOptions : DriverOptions {
-  std::vector<std::string> maps;  // names of maps for load_map(); the paper uses eight towns
+  std::vector<std::string> maps;  // map names for load_map(); the paper uses eight towns
   std::vector<Density> densities{Density::light, Density::medium, Density::dense};
-  int agents_per_world = 0;         // > 0: replaces kDensityAgents
-  std::vector<std::string> others;  // drivers of other vehicles, see evaluation/mixed_traffic.h
+  int agents_per_world = 0;         // if > 0, replaces kDensityAgents
+  std::vector<std::string> others;  // see evaluation/mixed_traffic.h
   int first_scenario = 0, scenarios = 200, steps = 3000;
   std::function<void(double done_fraction, double eta_s)> on_progress;
   EvaluationObserver* observer = nullptr;
@@ -60,36 +59,32 @@ void visit_options(EvaluateOptions& options, Visitor&& v) {
 }
 
 struct EvaluateReport {
-  // Counts of the completed densities, in the order of options.densities. For each density, the counts of the evaluated
-  // driver come first, then the counts of the other drivers.
+  // Counts of the completed densities. For each density, the evaluated driver precedes the other drivers.
   EvaluationResults results;
-  std::vector<EvaluateRow> rows;  // one row per entry of results.densities
-  bool interrupted = false;  // an interrupt (common/support/interrupt.h) came before the last density was completed
-  // seconds: wall time without loading maps and creating the renderer. agent_steps: steps of active agents of all
-  // classes. Both are 0 in a report that was merged from parts.
+  std::vector<EvaluateRow> rows;  // one row per element of results.densities
+  bool interrupted = false;       // an interrupt came before the last density was complete
+  // seconds: wall time without loading maps and creating the renderer. agent_steps: steps of active agents. Both are 0
+  // in a merged report.
   double seconds = 0;
   int64_t agent_steps = 0;
 };
 
 /// State shared by evaluations in the same worlds.
 struct EvaluationWorlds {
-  CompiledMaps maps;             // EvaluateOptions::maps, compiled with the map options of the session's world
-  Renderer* renderer = nullptr;  // for the session's images, with maps under handles 0, 1, ...; null without images
-  std::unique_ptr<Simulator> simulator;  // created by the first evaluation
-  std::string maps_hash;                 // value of EvaluationSetting::maps_hash; computed by the first evaluation
+  CompiledMaps maps;                     // compiled with the map options of the session's world
+  Renderer* renderer = nullptr;          // for images, with maps under handles 0, 1, ...; null without images
+  std::unique_ptr<Simulator> simulator;  // created by the first evaluation, as is maps_hash
+  std::string maps_hash;
 };
 
-/// Compiles the options' maps for worlds of the configuration `world`.
 CompiledMaps compile_maps_of(const EvaluateOptions& options, const SimulatorConfig& world);
 
-/// Evaluates the policy or controller of the options. Scenario k uses map k modulo the number of maps, and draws random
-/// numbers as world kFirstEvaluationWorld + k. So no scenario equals a training world, whatever the seeds. Throws Error
-/// naming file and key for bad input.
+/// Evaluates the policy or controller of the options. Scenario k uses map k modulo the number of maps, and the random
+/// numbers of world kFirstEvaluationWorld + k. Throws Error naming file and key for bad input.
 EvaluateReport evaluate(const EvaluateOptions& options);
-/// Evaluates a session's policy, with the session's own device, renderer and cameras.
+/// Evaluates with a session's policy, device, renderer and cameras.
 EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options);
-/// Evaluates a session's policy in shared worlds. All evaluations in the same worlds must have an equal number of
-/// steps.
+/// Evaluates in shared worlds. All evaluations in the same worlds need equal EvaluateOptions::steps.
 EvaluateReport evaluate(PolicySession* session, const EvaluateOptions& options, EvaluationWorlds* worlds);
 /// Evaluates options.controller in shared worlds.
 EvaluateReport evaluate(const EvaluateOptions& options, EvaluationWorlds* worlds);

@@ -1,4 +1,4 @@
-// Evaluation in recorded scenes: the paper's zero-shot protocol and related protocols. Includes no torch headers.
+// Evaluation in recorded scenes, by the paper's zero-shot protocol and variants.
 #pragma once
 
 #include <functional>
@@ -14,39 +14,38 @@
 namespace pictura {
 
 struct SceneEvaluateOptions : DriverOptions {
-  std::vector<std::string> scenes;  // names of scenes for find_scenes(), evaluated in this order
+  std::vector<std::string> scenes;  // scene names for find_scenes(), evaluated in this order
   SceneProtocol protocol;
-  int first_scene = 0, num_scenes = 0;  // range within the scenes found; num_scenes 0: all scenes from first_scene on
-  bool hashes_scenes = false;           // whether to compute EvaluationSetting::maps_hash, which reads all scene files
-  int scenes_at_once = 0;  // number of scenes simulated together; changes no result; 0: chosen for the device
-  // Called for every driven road user, in the order of scenes, then densities, then rollouts, then tracks.
+  int first_scene = 0, num_scenes = 0;  // range of scenes; num_scenes 0: all from first_scene on
+  bool hashes_scenes = false;           // computes EvaluationSetting::maps_hash from all files
+  int scenes_at_once = 0;               // changes no result; 0: chosen for the device
+  // Called for each driven road user, ordered by scene, density, rollout and track.
   std::function<void(const SceneAgent&)> on_agent;
-  // Called for every scene that was simulated. If set, the protocol must satisfy check_rollouts().
+  // Called for each scene. Requires a protocol that satisfies check_rollouts().
   std::function<void(const SceneRollouts&)> on_rollouts;
-  // Version of the realism score: one of realism_version_names(). Empty: rollouts are not scored. If set, the protocol
-  // must satisfy check_rollouts().
+  // One of realism_version_names(), or empty for no score. A version requires a protocol that satisfies
+  // check_rollouts().
   std::string realism;
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
 
 struct SceneEvaluation {
   SceneResults results;
-  std::vector<SceneRow> rows;  // one per density of the protocol
-  int found = 0;               // number of scenes to evaluate
-  bool interrupted = false;    // an interrupt came; completed scenes are reported
-  double seconds = 0;          // wall time, including the loading of scenes
-  RealismReport realism;       // filled if options.realism is given
+  std::vector<SceneRow> rows;
+  int found = 0;             // scenes to evaluate
+  bool interrupted = false;  // completed scenes are reported
+  double seconds = 0;        // wall time, including loading
+  RealismReport realism;     // filled if a realism version is given
 
-  /// Returns the scenes, files and trailing parts of files that are left out, with reasons.
+  /// Returns excluded scenes, files and file ends, with reasons.
   std::vector<std::string> faults() const;
 };
 
-/// Returns `config`, the configuration of an evaluation, with the protocol's settings and without the features that
-/// recorded scenes lack.
+/// Returns `config` with the protocol's settings, without features that recorded scenes lack.
 SimulatorConfig protocol_config(const SceneProtocol& protocol, SimulatorConfig config);
 
-/// Evaluates a driver in recorded scenes. Scenes that cannot be read or simulated are left out and reported. Throws
-/// Error if there are no scenes or if no scene can be evaluated; UsageError for an invalid protocol.
+/// Evaluates a driver. Excludes and reports scenes that cannot be read or simulated. Throws Error if no scene remains,
+/// UsageError for an invalid protocol.
 SceneEvaluation evaluate_scenes(const SceneEvaluateOptions& options);
 
 }  // namespace pictura

@@ -1,5 +1,4 @@
-// Driver under evaluation: a saved policy or a controller, with its device. It drives in worlds of any kind. Includes
-// no torch headers.
+// Driver under evaluation: a saved policy or a controller, with its device.
 #pragma once
 
 #include <functional>
@@ -17,23 +16,23 @@ class PolicyController;
 class PolicySession;
 class Renderer;
 
-/// Options of a driver: a policy and how it is opened, or a controller.
+/// A policy with its session's options, or a controller.
 struct DriverOptions : SessionOptions {
   DriverOptions() { simulator = "auto"; }
 
   std::string checkpoint;
-  // Controller that drives instead of the checkpoint's policy: a name known to make_controller(), for instance "lane".
-  // The world's configuration is the checkpoint's; without a checkpoint it is the paper's.
+  // Controller that drives instead of the checkpoint's policy, see make_controller(). The checkpoint still defines the
+  // world; without a checkpoint, the world is the paper's.
   std::string controller;
-  // Creates a controller that the calling program supplies; `controller` is then its name. The controller runs on the
-  // host and reads vector observations. If the options define cameras (rig, or width_px and height_px), the last
-  // argument is a renderer that has these cameras and holds the simulator's maps. Without cameras it is null.
+  // Creates the calling program's own controller, named `controller`. It runs on the host and reads vector
+  // observations. The last argument is null without cameras (rig, or width_px and height_px). With cameras, it is a
+  // renderer that has them and holds the simulator's maps.
   std::function<std::unique_ptr<Controller>(const DriverOptions&, const Simulator&, Renderer*)> make_own_controller;
   bool argmax = true;
   uint64_t seed = 1;
 };
 
-/// Visits the options of a driver except `checkpoint` and `controller`.
+/// Visits all options of a driver except `checkpoint` and `controller`.
 template <typename Visitor>
 void visit_options(DriverOptions& options, Visitor&& v) {
   v.value({"argmax"}, options.argmax);
@@ -41,35 +40,31 @@ void visit_options(DriverOptions& options, Visitor&& v) {
   visit_options(static_cast<SessionOptions&>(options), v);
 }
 
-/// Controller of the agents in a batch of worlds. num_driven() returns the number of agents that the controller drove
-/// in its last act().
+/// Controller of a batch of worlds, and the number of agents that its last act() drove.
 struct Driving {
   std::unique_ptr<Controller> controller;
   std::function<int64_t()> num_driven;
 };
 
-/// Returns the number of active agents in all worlds.
 int64_t count_active(Simulator& simulator);
-/// Creates a controller by which a session's policy drives in a simulator, with the options' argmax and seed. A policy
-/// that was trained without auxiliary slots (observed numbers that no image shows) reads zeros in these slots even if
-/// the simulator fills them.
+/// Creates a controller that drives with a session's policy, and the options' argmax and seed. A policy trained without
+/// auxiliary slots (observed numbers that no image shows) reads zeros there.
 std::unique_ptr<PolicyController> policy_controller(PolicySession& session, Renderer* renderer,
                                                     const DriverOptions& options, const Simulator& simulator);
 
-/// Driver under evaluation. The session, renderer and options from which it was created must outlive it.
+/// Driver under evaluation. Its session, renderer and options must outlive it.
 struct EvaluatedDriver {
-  SimulatorConfig world;      // the paper's evaluation world: fixed conditioning and lights, no early end of episodes
+  SimulatorConfig world;      // fixed conditioning and lights, no early end of episodes (paper)
   EvaluationSetting setting;  // the driver's part of the setting
   Device device;
   std::function<Driving(Simulator&)> drive;
 };
 
-/// Returns the part of an evaluation's setting that a session determines: policy, precision, device and images.
+/// Returns a session's part of the setting: policy, precision, device and images.
 EvaluationSetting setting_of(const PolicySession& session);
 
-/// Creates the driver of a session's policy, for episodes of `steps` steps.
+/// steps: length of an episode.
 EvaluatedDriver policy_driver(PolicySession* session, Renderer* renderer, const DriverOptions& options, int steps);
-/// Creates the driver of options.controller, which needs no policy.
 EvaluatedDriver controller_driver(const DriverOptions& options, int steps);
 
 }  // namespace pictura

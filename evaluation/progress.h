@@ -1,4 +1,4 @@
-// Progress of an evaluation: the completed fraction and the remaining time. Includes no torch headers.
+// Progress of an evaluation.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +10,10 @@ namespace pictura {
 
 class EvaluationClock {
  public:
-  /// Creates a clock. on_progress(completed fraction, remaining seconds) may be empty; it must outlive the clock.
+  /// on_progress(completed fraction, remaining seconds) may be empty. It must outlive the clock.
   explicit EvaluationClock(const std::function<void(double, double)>& on_progress) : on_progress_(on_progress) {}
 
-  /// Reports progress from the second call on. The time before the first call is ignored, because it includes
-  /// compilation and tuning.
+  /// Reports progress from the second call on, because the time before the first call includes compilation and tuning.
   void update(double fraction) {
     if (!on_progress_) return;
     if (first_s_ < 0) {
@@ -35,8 +34,8 @@ class EvaluationClock {
   double first_s_ = -1, first_fraction_ = 0;
 };
 
-/// Returns a progress callback for the next of `count` equally long parts, of which `finished` are complete. The
-/// callback reports the progress of all parts together to on_progress, which must outlive the callback.
+/// Returns a progress callback for one of `count` equal parts, after `finished` parts. The callback reports the overall
+/// progress to on_progress, which must outlive the callback.
 inline std::function<void(double, double)> progress_of_part(const std::function<void(double, double)>& on_progress,
                                                             std::ptrdiff_t finished, std::ptrdiff_t count) {
   return [&on_progress, finished, count](double done, double eta_s) {

@@ -1,5 +1,4 @@
-// JSON format that all result files of evaluations share. Results of parts of an evaluation are merged from these
-// files.
+// JSON format of the result files of evaluations.
 #pragma once
 
 #include <functional>
@@ -14,7 +13,7 @@ namespace pictura {
 Json to_json(const EvaluationSetting& setting);
 EvaluationSetting setting_from(const Json& json);
 
-/// Returns the counts of a ScenarioCounts or SceneCounts by name; counts_from() is the inverse.
+/// Returns the counts of a ScenarioCounts or SceneCounts by name.
 template <typename Counts>
 Json counts_json(const Counts& counts) {
   Json json;
@@ -28,16 +27,13 @@ Counts counts_from(const Json& json) {
   return counts;
 }
 
-/// Compares the JSON objects of two parts. Throws Error naming both parts and the first key with different values. Keys
-/// of nested objects are written as "rules.box_scale"; `within` is the prefix of all keys.
+/// Throws Error naming both parts and the first different key, such as "rules.box_scale". `within`: prefix of the key.
 void check_same(const Json& first, const std::string& first_name, const Json& other, const std::string& other_name,
                 const std::string& within = "");
 
-/// Reads a file's JSON. Throws Error naming the file if its format is not in `formats`. The first of `formats` is the
-/// current format.
+/// Throws Error naming the file if its format is not in `formats`, whose first element is the current format.
 Json read_results_json(const std::string& path, const std::vector<std::string>& formats);
-/// Calls parse(). Throws Error naming the file if parse() throws a JSON exception, for instance because a value is
-/// missing.
+/// Calls parse(). Converts its JSON exceptions to an Error naming the file.
 void parse_results(const std::string& path, const std::function<void()>& parse);
 
 }  // namespace pictura

@@ -1,6 +1,5 @@
-// Robust protocol: one table of a driver's performance in generated towns, among other drivers, and with randomized
-// cameras. The protocol fixes everything except the driver, so that results of different drivers are comparable.
-// Includes no torch headers.
+// Robust protocol: a driver's performance in generated towns, among other drivers, and with randomized cameras. Only
+// the driver varies, so results are comparable.
 #pragma once
 
 #include <functional>
@@ -12,49 +11,45 @@
 
 namespace pictura {
 
-constexpr const char* kRobustProtocol = "robust";  // name of the protocol in commands
+constexpr const char* kRobustProtocol = "robust";  // name in commands
 constexpr int kRobustScenarios = 24;               // per condition
-constexpr int kRobustSteps = 1200;                 // steps of 0.1 s
+constexpr int kRobustSteps = 1200;                 // 0.1 s each
 constexpr uint64_t kRobustSeed = 1;
 
-/// Worlds of one row of the table.
+/// Worlds of one table row.
 struct RobustCondition {
   std::string part;                 // "towns", "carla", "others" or "cameras"
   std::string name;                 // unique
-  std::vector<std::string> maps;    // names of maps for load_map()
-  int agents_per_world = 0;         // agents of all classes
-  std::vector<std::string> others;  // in the format of other_drivers()
-  double camera_severity = 0;       // as SessionOptions::camera_severity
+  std::vector<std::string> maps;    // for load_map()
+  int agents_per_world = 0;         // all classes
+  std::vector<std::string> others;  // see other_drivers()
+  double camera_severity = 0;       // see SessionOptions
 };
 
-/// Returns the conditions in the order of the table. The first condition is the reference with which all others are
-/// compared.
+/// Returns the conditions in the table's order. The first is the reference of the others.
 const std::vector<RobustCondition>& robust_conditions();
 
-/// Metrics of the evaluated driver in one condition.
 struct RobustRow {
   RobustCondition condition;
-  DensityResult counts;    // without scenarios if the condition does not apply
-  std::string not_driven;  // why the condition does not apply to the driver; empty if it applies
+  DensityResult counts;    // empty if the condition does not apply
+  std::string not_driven;  // reason why the condition does not apply, or empty
 };
 
 struct RobustReport {
-  EvaluationSetting setting;  // setting of the first condition
+  EvaluationSetting setting;  // the first condition's setting
   std::vector<RobustRow> rows;
-  bool interrupted = false;  // an interrupt came; completed conditions are reported
+  bool interrupted = false;  // completed conditions are reported
   double seconds = 0;
   int64_t agent_steps = 0;
 
-  /// Returns the metrics of a row's scenarios.
   EvaluateRow metrics(const RobustRow& row) const;
-  /// Returns the pooled metrics of each of the parts "towns", "others" and "cameras", over all scenarios of the part's
-  /// rows. The entry "all" pools all parts except "carla", because users must supply CARLA's maps. Parts without driven
-  /// scenarios are left out.
+  /// Returns the metrics of the parts "towns", "others" and "cameras", and of all three together as "all". Pools all
+  /// scenarios of a part, and omits parts without scenarios.
   std::vector<std::pair<std::string, EvaluateRow>> pooled() const;
 };
 
 struct RobustOptions : DriverOptions {
-  int scenarios = kRobustScenarios;  // per condition; only results with the default number are comparable
+  int scenarios = kRobustScenarios;  // per condition; only the default gives comparable results
   std::function<void(double done_fraction, double eta_s)> on_progress;
 };
 
@@ -67,10 +62,9 @@ void visit_options(RobustOptions& options, Visitor&& v) {
   v.callback({"on_progress"}, options.on_progress);
 }
 
-/// Evaluates a driver in every condition that applies to it. Conditions with randomized cameras apply to drivers that
-/// read images. The condition with impaired drivers applies to drivers that read observations. The condition "carla"
-/// applies if the map folder contains CARLA's towns. Throws UsageError if the options set a seed, camera_severity,
-/// conditioning or lights other than the protocol's. Otherwise throws as evaluate() does.
+/// Evaluates a driver in every condition that applies to it. Randomized cameras require images; impaired drivers
+/// require observations; "carla" requires CARLA's towns in the map folder. Throws UsageError for a seed,
+/// camera_severity, conditioning or lights other than the protocol's, and as evaluate() does.
 RobustReport evaluate_robust(const RobustOptions& options);
 
 }  // namespace pictura

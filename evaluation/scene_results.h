@@ -1,5 +1,4 @@
-// Results of evaluated vehicles in recorded scenes (by road user, by scene and over all scenes). Results can be saved
-// in files and merged. Includes no torch headers.
+// Results in recorded scenes, and mergeable result files.
 #pragma once
 
 #include <cstdint>
@@ -26,14 +25,14 @@ namespace pictura {
   X(double, distance_m)                                                     \
   X(int64_t, driven_steps) /* steps of all driven road users */
 
-/// Counts over the driven vehicles of all rollouts of one scene at one density. An event counts once per vehicle and
-/// rollout, however often it happens.
+/// Counts over the driven vehicles of all rollouts of one scene and density. An event counts once per vehicle and
+/// rollout.
 struct SceneCounts {
 #define X(type, name) type name = 0;
   PICTURA_SCENE_COUNTS(X)
 #undef X
 
-  /// Calls visit(name in files, count) for all counts of `counts`, a SceneCounts.
+  /// Calls visit(name in files, count) for all counts.
   template <typename Counts, typename Visit>
   static void visit(Counts& counts, const Visit& visit) {
 #define X(type, name) visit(#name, counts.name);
@@ -42,24 +41,22 @@ struct SceneCounts {
   }
 };
 
-/// Counts of an evaluation. It covers num_scenes of the setting's scenes, beginning with the scene first_scene.
 struct SceneResults {
   EvaluationSetting setting;  // `maps` holds SceneEvaluateOptions::scenes
   SceneProtocol protocol;
-  // Unreadable files and unreadable trailing parts of files, with reasons. The list covers the whole input, not only
-  // this range of scenes.
+  // Unreadable files and file ends of the whole input, with reasons.
   std::vector<std::string> unread;
   int first_scene = 0, num_scenes = 0;
-  int without_drivers = 0;          // scenes left out because all of their road users are parked or absent
-  int repaired_headings = 0;        // in scored scenes, by SceneProtocol::max_first_turn_deg
-  std::vector<std::string> faults;  // scenes left out because they cannot be read or simulated, with reasons
+  int without_drivers = 0;                       // excluded: all road users are parked or absent
+  int repaired_headings = 0;                     // of scored scenes, by SceneProtocol::max_first_turn_deg
+  std::vector<std::string> faults;               // excluded scenes that cannot be read or simulated
   std::vector<std::vector<SceneCounts>> counts;  // [densities][scored scenes]
 
   int scored() const { return counts.empty() ? 0 : static_cast<int>(counts.front().size()); }
-  int64_t agent_steps() const;  // steps of driven agents
+  int64_t agent_steps() const;  // driven agents only
 };
 
-/// One driven road user in one rollout of one scene at one density.
+/// A driven road user in one rollout.
 struct SceneAgent {
   std::string scenario_id;
   double density = 1;
@@ -68,18 +65,18 @@ struct SceneAgent {
   TrackType type = TrackType::unset;
   int32_t takeover_step = 0;  // episode step
   int32_t driven_steps = 0;
-  int events = 0;  // events of the agent's episode: bits of Event
+  int events = 0;  // bits of Event
   bool arrived = false;
   float distance_m = 0;
-  // Distance between the driven and the recorded position: mean over all steps at which the agent drives and the
-  // recording contains it, and value at the last of these steps. NaN without such steps.
+  // Distance between driven and recorded position: mean over driven steps with a recorded position, and last value. NaN
+  // without such steps.
   float mean_displacement_m = std::numeric_limits<float>::quiet_NaN(), final_displacement_m = mean_displacement_m;
 };
 
-/// Adds a road user to its scene's counts. Road users that are not vehicles add only their driven steps.
+/// Adds a road user to its scene's counts; non-vehicles add only driven steps.
 void add(const SceneAgent& agent, bool is_vehicle, SceneCounts* counts_inout);
 
-/// Results of one density over vehicle episodes, with confidence intervals over scenes.
+/// Results of one density; confidence intervals are over scenes.
 struct SceneRow {
   double density = 1;
   int scenes = 0;
@@ -87,27 +84,24 @@ struct SceneRow {
   double km_driven = 0;
   Estimate at_fault_collision_rate, off_road_rate, goal_rate;
   Estimate collision_rate;       // at fault or not
-  Estimate mean_displacement_m;  // mean over vehicles of SceneAgent::mean_displacement_m
+  Estimate mean_displacement_m;  // mean over vehicles
 };
 SceneRow row_of(double density, const std::vector<SceneCounts>& scenes);
-/// Returns a row for each density of the protocol; empty if no scene was scored.
+/// Returns one row per density; empty if no scene was scored.
 std::vector<SceneRow> rows_of(const SceneResults& results);
-/// Returns the metrics of a row, with their names in files.
+/// Returns a row's metrics with their names in files.
 std::vector<std::pair<std::string, Estimate>> metrics_of(const SceneRow& row);
 
-/// Merges parts of an evaluation. The parts must have equal settings and protocols; their scenes must be disjoint and
-/// together contiguous. `names`: names of the parts in errors. Throws Error naming two parts and their difference.
+/// Merges as merge() of results.h does. The parts also need equal protocols.
 SceneResults merge(const std::vector<SceneResults>& parts, const std::vector<std::string>& names);
 
-/// Write and read results as one JSON object, without loss. read_scene_results() throws Error naming the file and what
-/// is missing.
+/// Write and read JSON without loss. read_scene_results() throws Error naming the file and what is missing.
 void write_results(const std::string& path, const SceneResults& results);
 SceneResults read_scene_results(const std::string& path);
-/// Whether the file contains results of recorded scenes, rather than results of towns or other data.
+/// False for results of towns and for other data.
 bool has_scene_results(const std::string& path);
 
-/// Return lines of the CSV file of road users, with newlines: the head with the names of columns, and the line of one
-/// road user.
+/// Return lines of the CSV file of road users, with newlines.
 std::string scene_agents_csv_head();
 std::string csv_line(const SceneAgent& agent);
 

@@ -1,5 +1,4 @@
-// Rollouts of recorded scenes as the Waymo Open Sim Agents Challenge defines them, and a writer and a reader of their
-// file format. realism.h scores rollouts. Includes no torch headers.
+// Rollouts of recorded scenes in the file format of the Waymo Open Sim Agents Challenge.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +12,14 @@
 
 namespace pictura {
 
-/// Centre of a road user's box, in the coordinates of the scene's file.
+/// Centre of a box, in the coordinates of the scene's file.
 struct SimulatedState {
   float x_m = 0, y_m = 0, z_m = 0;
   float heading_rad = 0;  // in [-pi, pi], from x towards y
 };
 
-/// Rollouts of one scene. They contain all road users that are present at the protocol's start, with their states after
-/// each step of each rollout. A road user that left, or that the recording no longer contains, keeps its last state.
+/// Rollouts of all road users present at the protocol's start, with states after each step. A road user that left or is
+/// no longer recorded keeps its last state.
 struct SceneRollouts {
   std::string scenario_id;
   int steps = 0;
@@ -29,22 +28,21 @@ struct SceneRollouts {
 };
 
 /// Throws UsageError if the protocol differs from the challenge's: 32 rollouts of 80 steps from step 10 on, with all
-/// road users that are present.
+/// present road users.
 void check_rollouts(const SceneProtocol& protocol);
 
-/// Encodes a scene as a message ScenarioRollouts of the challenge's schema
-/// (waymo_open_dataset/protos/sim_agents_submission.proto, proto2). Throws Error for a track id that does not fit into
-/// the schema's int32.
+/// Encodes a message ScenarioRollouts (waymo_open_dataset/protos/sim_agents_submission.proto). Throws Error if a track
+/// id exceeds int32.
 std::string encoded(const SceneRollouts& scene);
 
-/// Writer of a file with one message SimAgentsChallengeSubmission. The message contains the type and the scenes of a
-/// submission, but no authors. The concatenation of several such files is also a valid message.
+/// Writes one message SimAgentsChallengeSubmission with type and scenes, without authors. Concatenated files are also a
+/// valid message.
 class RolloutsFile {
  public:
   explicit RolloutsFile(const std::string& path);
-  /// Appends a scene. Throws Error if the message would exceed 2 GiB, because protobuf cannot read larger messages.
+  /// Throws Error if the message would exceed protobuf's limit of 2 GiB.
   void write(const SceneRollouts& scene);
-  /// Moves the complete file to its path, see OutputFile.
+  /// Moves the complete file to its path.
   void commit() { file_.commit(); }
 
  private:
@@ -52,25 +50,23 @@ class RolloutsFile {
 
   std::string path_;
   OutputFile file_;
-  size_t size_ = 0;  // bytes
+  size_t size_ = 0;
 };
 
-/// Reader of a file of one or several concatenated messages SimAgentsChallengeSubmission, written by RolloutsFile or by
-/// another program.
+/// Reads one or several concatenated messages SimAgentsChallengeSubmission, also of other programs.
 class RolloutsReader {
  public:
-  /// Reads the file and lists its scenes. Throws Error naming the file and the field if the bytes are not
-  /// SimAgentsChallengeSubmission messages, the submission has another type, or a scenario occurs twice.
+  /// Throws Error naming file and field for invalid bytes, another submission type, or a repeated scenario.
   explicit RolloutsReader(const std::string& path);
-  std::vector<std::string> scenario_ids() const;  // in alphabetical order
+  std::vector<std::string> scenario_ids() const;  // alphabetical
   bool has(const std::string& scenario_id) const { return scenes_.contains(scenario_id); }
-  /// Reads one scene. Throws Error naming file, scenario and field if trajectories have different lengths, rollouts
-  /// contain different objects, or an object occurs twice.
+  /// Throws Error naming file, scenario and field if trajectories differ in length, rollouts differ in objects, or an
+  /// object is repeated.
   SceneRollouts read(const std::string& scenario_id) const;
 
  private:
   std::string path_, bytes_;
-  std::map<std::string, std::string_view> scenes_;  // by scenario id: its message ScenarioRollouts, a part of bytes_
+  std::map<std::string, std::string_view> scenes_;  // scenario id to message ScenarioRollouts in bytes_
 };
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Host copy of the data that observers of an evaluation read from its worlds after a step.
+// Host copy of the data that evaluation observers read.
 #pragma once
 
 #include <cstddef>
@@ -11,11 +11,11 @@
 namespace pictura {
 
 struct WorldArrays {
-  std::vector<AgentStatus> status;      // [slots]
-  std::vector<AgentClass> agent_class;  // [slots]
-  std::vector<float> speed_mps;         // [slots]
-  std::vector<AgentBox> boxes;          // world after world: boxes of its agents, then of its parked cars
-  std::vector<LightState> lights;       // world after world: lights of its map's stop lines
+  std::vector<AgentStatus> status;                          // [slots]
+  std::vector<AgentClass> agent_class;                      // [slots]
+  std::vector<float> speed_mps;                             // [slots]
+  std::vector<AgentBox> boxes;                              // by world: agents, then parked cars
+  std::vector<LightState> lights;                           // by world: lights of stop lines
   std::vector<int32_t> slot_begin, box_begin, light_begin;  // [worlds + 1]
 
   explicit WorldArrays(Simulator& simulator)
@@ -28,7 +28,6 @@ struct WorldArrays {
         box_begin(host_copy(simulator.scene().world_begin, simulator.device())),
         light_begin(host_copy(simulator.scene().light_begin, simulator.device())) {}
 
-  /// Copies a field of the agents' state.
   template <typename T>
   static std::vector<T> values_of_slots(Simulator& simulator, const T* values) {
     return host_copy(Span<const T>(values, static_cast<size_t>(simulator.num_slots())), simulator.device());

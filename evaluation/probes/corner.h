@@ -1,6 +1,5 @@
 // Probe of blind corners (paper, "Closed-loop driving reveals occlusion-aware behavior"). It compares how policies
-// approach two kinds of corners: those at which walls hide a crossing vehicle, and empty ones. Includes no torch
-// headers.
+// approach corners with a hidden vehicle and empty corners.
 #pragma once
 
 #include "pictura/evaluation/probes/corner_results.h"
@@ -14,9 +13,9 @@ struct CornerOptions : ProbeOptions {
   CornerOptions() {
     sample_steps = 5;
     batch = 256;
-    worlds.adds_walls = true;  // walls make the corners blind
+    worlds.adds_walls = true;
   }
-  int64_t pairs = 200;  // maximum total number; pairs are taken from all scenes in turn
+  int64_t pairs = 200;  // maximum; pairs are taken from all scenes in turn
   CornerSearch search;
   CornerControl control = CornerControl::none;
 };
@@ -45,20 +44,14 @@ void visit_options(CornerOptions& options, Visitor&& v) {
            options.control, kCornerControlNames);
 }
 
-/// Drives evaluation worlds as probe_removal() does, or with options.worlds.controller in all worlds. Searches the
-/// states of these worlds for egos (the vehicles to be taken over) that approach blind corners; see
-/// find_corner_states(). A state with a hidden vehicle is kept if that vehicle enters the junction within
-/// kTakeoverSteps and the ego sees no part of the vehicle. Renderer::visibility decides this, in the cameras of the
-/// first policy that reads images, or in the paper's cameras if no policy reads images. All states, with and without a
-/// hidden vehicle, are kept only if their scene lasts kTakeoverSteps more steps. Each pair of match_corners() is a
-/// state with a hidden vehicle and a similar state without one. Each policy then drives the ego for kTakeoverSteps
-/// (TakeoverWorlds) from three states: the state with the hidden vehicle, this state after removal of the vehicle, and
-/// the similar state. Each run takes place in a world with walls and in a world without walls. `batch` pairs run
-/// together. An interrupt ends the probe with the completed pairs. Throws UsageError if the number of scenes is not a
-/// multiple of the number of policies. Throws Error naming file and key for bad input.
+/// Drives evaluation worlds as probe_removal() does, or with options.worlds.controller. Searches their states for egos
+/// (vehicles to be taken over) before blind corners, see find_corner_states(). A hidden vehicle must enter the junction
+/// within kTakeoverSteps, and the ego must see no part of it (ProbeRun::visibility()). The scene must last
+/// kTakeoverSteps after the state. match_corners() pairs states with and without a hidden vehicle. Each policy then
+/// drives the ego for kTakeoverSteps (TakeoverWorlds) from each CornerCase, in worlds with and without walls. `batch`
+/// pairs run together. Interrupts and errors are as for probe_removal().
 CornerResults probe_corner(const CornerOptions& options);
-/// Probes policies that are already open on one device, with their renderers and cameras. options.policies holds their
-/// names.
+/// Probes policies that are open on one device, see probe_removal().
 CornerResults probe_corner(const std::vector<PolicySession*>& sessions, const CornerOptions& options);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Memory on the network's device for agents' observations.
+// Observation arrays on the network's device.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace pictura {
 
-/// Observation arrays of `count` agents, for the parts that the configuration observes. They initially contain zeros.
+/// Arrays of `count` agents for the observed parts, initially zero.
 class ObservationRows {
  public:
   ObservationRows(int64_t count, const SimulatorConfig& config) {

@@ -1,6 +1,5 @@
 // Probe of a tracked pedestrian (paper, "Counterfactual probes reveal visual grounding"). It measures, in frozen
-// states, responses of policies to a pedestrian that emerges from behind a vehicle and is hidden again. Includes no
-// torch headers.
+// states, policies' responses to a pedestrian that emerges from behind a vehicle and is hidden again.
 #pragma once
 
 #include "pictura/evaluation/probes/pedestrian_results.h"
@@ -11,11 +10,10 @@ namespace pictura {
 class PolicySession;
 
 struct PedestrianOptions : ProbeOptions {
-  int64_t paths = 32;        // maximum number in all scenes together, divided evenly among scenes
-  float hider_range_m = 30;  // maximum distance of a vehicle that hides a path
-  float min_speed_mps = 1;   // minimum speed of the ego, forwards
-  // Height of the inserted pedestrian, a child. Vehicles are 1.5 m high, so they can hide a child from all cameras.
-  // They cannot hide the world's other pedestrians, which are 1.7 m high, from cameras above 1.5 m.
+  int64_t paths = 32;        // maximum; divided evenly among scenes
+  float hider_range_m = 30;  // maximum distance of the hiding vehicle
+  float min_speed_mps = 1;   // forward speed of the ego
+  // Height of the pedestrian, a child. Vehicles are 1.5 m high, so they can hide it from all cameras.
   float height_m = 1.2f;
   PedestrianControl control = PedestrianControl::none;
 };
@@ -36,18 +34,13 @@ void visit_options(PedestrianOptions& options, Visitor&& v) {
            options.control, kPedestrianControlNames);
 }
 
-/// Drives evaluation worlds as probe_removal() does, and searches their states for paths. A path needs an ego, which is
-/// an active vehicle, and a hider, which is a vehicle or parked car ahead of the ego within hider_range_m. The path is
-/// one of those that paths_behind() returns for the hider. Along the path a pedestrian is first wholly hidden by the
-/// hider, then seen, and then wholly hidden again (usable_part()). The pedestrian is placed on each point of the path
-/// in the otherwise unchanged state. Each policy gets its input with and without the pedestrian: vectors from
-/// Simulator::observe, images from a scene with the pedestrian's box. Visibility is measured in the cameras of the
-/// first policy that reads images, or in the paper's cameras if no policy reads images. An interrupt ends the probe
-/// with the completed cases. Throws UsageError if the number of scenes is not a multiple of the number of policies.
-/// Throws Error naming file and key for bad input.
+/// Drives evaluation worlds as probe_removal() does, and searches their states for paths. A path begins behind a hider:
+/// a vehicle or parked car ahead of the ego, within hider_range_m (paths_behind(), usable_part()). The pedestrian is
+/// placed on each point of the path. Each policy gets inputs with and without it: vectors from Simulator::observe,
+/// images from the scene. Visibility is measured by ProbeRun::visibility(). Interrupts and errors are as for
+/// probe_removal().
 PedestrianResults probe_pedestrian(const PedestrianOptions& options);
-/// Probes policies that are already open on one device, with their renderers and cameras. options.policies holds their
-/// names.
+/// Probes policies that are open on one device, see probe_removal().
 PedestrianResults probe_pedestrian(const std::vector<PolicySession*>& sessions, const PedestrianOptions& options);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// JSON that the summaries of all probes have in common.
+// Shared JSON of the probes' summaries.
 #pragma once
 
 #include "pictura/common/support/json_text.h"
@@ -10,14 +10,13 @@ namespace pictura {
 /// Adds the numbers of cases and scenes, and the estimates.
 void add_means(const ResponseMeans& means, Json* json_out);
 
-/// Returns the policies, each with the number of cases in scenes that the policy drove. drivers: [cases] index of the
-/// scene's driver.
+/// Returns the policies with the numbers of cases in their scenes. drivers: [cases] driver indices.
 Json policies_json(const ProbeResults& results, const std::vector<int32_t>& drivers);
 
-/// Adds the settings of worlds, driver and device, whether the probe was interrupted, and its duration.
+/// Adds the settings, interruption and duration.
 void add_setting(const ProbeResults& results, Json* json_out);
 
-/// Returns the text of a summary, which consists of `json`, the setting, and to_json(row) of each row.
+/// Returns the text of `json`, the setting, and to_json(row) of each row.
 template <typename Row, typename ToJson>
 std::string summary_text(const ProbeResults& results, Json json, const std::vector<Row>& rows, const ToJson& to_json) {
   add_setting(results, &json);

@@ -1,5 +1,4 @@
-// Options of all probes. In a probe, policies drive worlds, and the probe measures how policies respond to changes of
-// the worlds' states. Includes no torch headers.
+// Options of all probes, which measure how policies respond to changes of driven worlds.
 #pragma once
 
 #include <functional>
@@ -16,19 +15,19 @@ struct ProbeOptions {
   ProbeOptions() {
     worlds.densities = {Density::medium};
     worlds.scenarios = 0;
-    worlds.steps = 600;  // one minute; most agents still drive at its end
+    worlds.steps = 600;  // most agents still drive after one minute
   }
 
-  // Worlds, devices and progress callback. Only the first of `densities` is used. `first_scenario` and `scenarios`
-  // select the scenes (scenarios 0: default_probe_scenes()). Each policy drives an equal number of scenes: the first
-  // policy the first range, and so on. The policies are those of `policies`, not `checkpoint`.
+  // Worlds, devices and progress callback. Only the first density is used. `first_scenario` and `scenarios` select the
+  // scenes (0: default_probe_scenes()). Each policy drives an equal consecutive range of scenes. `policies` replaces
+  // `checkpoint`.
   EvaluateOptions worlds;
-  std::vector<std::string> policies;  // files (checkpoints or safetensors), or names of policies of the calling program
-  // Element i creates the session of policies[i] if the calling program supplies this policy. It is empty for a file,
-  // and may be missing if only files follow.
+  std::vector<std::string> policies;  // files, or names of the calling program's policies
+  // Element i creates the session of the calling program's policies[i]; empty for a file. Trailing elements may be
+  // missing.
   std::vector<std::function<std::unique_ptr<PolicySession>(const DriverOptions&)>> make_own_policies;
-  int sample_steps = 10;  // number of steps between sampled states
-  int batch = 4096;  // cases computed together, rounded up to whole passes of a network; affects only memory and time
+  int sample_steps = 10;  // steps between sampled states
+  int batch = 4096;       // cases computed together, rounded up to whole passes; changes no result
 };
 
 /// Visits the options of all probes except policies, worlds and devices.
@@ -51,12 +50,11 @@ void visit_options(ProbeOptions& probe, Visitor&& v) {
           probe.batch);
 }
 
-/// Number of cases in every pass through a network. A case has two inputs: with and without its road user. They take
-/// the same row in two separate passes, so that equal inputs give bit-identical outputs.
+/// Cases per pass through a network. The two inputs of a case take the same row in two passes, so that equal inputs
+/// give bit-identical outputs.
 constexpr int probe_pass(Device device) { return device.is_host() ? 256 : 2048; }
 
-/// Returns the default number of scenes: each policy drives equally many on each map, and each map has two scenes or
-/// more.
+/// Returns a number of scenes that is equal for each policy and map, with at least two per map.
 int default_probe_scenes(size_t num_policies, size_t num_maps);
 
 }  // namespace pictura

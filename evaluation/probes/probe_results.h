@@ -1,5 +1,4 @@
-// Results that all probes have in common: policies and worlds, responses, and means over scenes. Includes no torch
-// headers.
+// Shared results of all probes.
 #pragma once
 
 #include <algorithm>
@@ -12,8 +11,8 @@
 
 namespace pictura {
 
-/// Responses of a policy to a state with a road user, and to the same state without the user. A response consists of
-/// the value and the probability of braking. The value is NaN if the policy has none.
+/// A policy's value and braking probability in a state with a road user and without it. The value is NaN if the policy
+/// has none.
 struct PairedResponse {
   float value = 0, value_without = 0;
   float brake = 0, brake_without = 0;
@@ -27,21 +26,20 @@ struct PairedResponse {
 };
 
 struct ProbedPolicy {
-  std::string name;  // unique; from the name of the policy's file or run
+  std::string name;  // unique; from its file or run
   std::string path, hash;
   bool reads_images = false;
-  std::string untrained_hash;  // hash of the fresh weights that respond instead of the policy; empty: the policy itself
-                               // responds
+  std::string untrained_hash;  // fresh weights that respond instead; else empty
 
-  /// Name of the responding policy in figures and tables.
+  /// Name in figures and tables.
   std::string responding_name() const { return untrained_hash.empty() ? name : "untrained " + name; }
 };
 
 struct ProbeResults {
-  EvaluationSetting setting;  // setting of the worlds; parts that depend on the policy are those of the first policy
+  EvaluationSetting setting;  // policy-dependent parts are the first policy's
   std::string density;
   int agents_per_world = 0;
-  int first_scene = 0, scenes = 0;  // driven scenes: each policy drives an equal share, in the order of policies
+  int first_scene = 0, scenes = 0;  // each policy drives an equal range, in order
   int sample_steps = 0;
   std::vector<ProbedPolicy> policies;
   std::string controller;                 // controller that drove all scenes; empty: the policies drove
@@ -49,7 +47,7 @@ struct ProbeResults {
   bool interrupted = false;
   double seconds = 0;
 
-  /// Name of a driver by its index; a controller comes after all policies.
+  /// A controller's index follows those of all policies.
   const std::string& driver_name(int32_t driver) const {
     const auto index = static_cast<size_t>(driver);
     return index < policies.size() ? policies[index].name : controller;
@@ -57,17 +55,17 @@ struct ProbeResults {
   const PairedResponse& response(size_t one, size_t policy) const { return responses[one * policies.size() + policy]; }
 };
 
-/// Mean responses of one policy to cases of one kind. An estimate is the mean over scenes of each scene's mean over its
-/// cases, with a 95 % interval. Without scenes, mean and interval are infinite.
+/// Mean responses of one policy. An estimate is the mean of the scenes' means, with a 95 % interval; infinite without
+/// scenes.
 struct ResponseMeans {
   int64_t cases = 0;
-  int scenes = 0;  // number of scenes with cases of this kind
+  int scenes = 0;  // number of scenes with cases
   Estimate abs_value_change, abs_brake_change;
   Estimate value_change, brake_change;  // signed
-  Estimate changed_share;  // share of cases in which the value or the probability differs in at least one bit
+  Estimate changed_share;               // cases in which a bit of the value or the probability differs
 };
 
-/// Mean over scenes of the mean of each scene's values.
+/// Mean over scenes of each scene's mean.
 class SceneMeans {
  public:
   void add(int32_t scene, double value) {
@@ -87,7 +85,6 @@ class SceneMeans {
   std::map<int32_t, Sum> sums_;
 };
 
-/// Accumulates responses.
 class ResponseSums {
  public:
   void add(int32_t scene, const PairedResponse& response);
@@ -97,7 +94,7 @@ class ResponseSums {
   SceneMeans abs_value_change_, abs_brake_change_, value_change_, brake_change_, changed_;
 };
 
-/// Returns the indices of `count` items in ascending order of key(index).
+/// Returns indices in ascending order of key(index).
 template <typename Key>
 std::vector<size_t> sorted_order(size_t count, const Key& key) {
   std::vector<size_t> order(count);
@@ -106,8 +103,8 @@ std::vector<size_t> sorted_order(size_t count, const Key& key) {
   return order;
 }
 
-/// Return CSV fields of responses: their names for the header, and their values for the row of case `one`. Each policy
-/// has the fields value, d_value, p_brake and d_p_brake. Both texts begin with a comma.
+/// Return the header and the row of case `one` in CSV: value, d_value, p_brake and d_p_brake of each policy. Both begin
+/// with a comma.
 std::string response_header(const ProbeResults& results);
 std::string response_fields(const ProbeResults& results, size_t one);
 

@@ -1,5 +1,5 @@
-// Procedure that all probes have in common: policies drive equal shares of the scenes, sampled states are collected in
-// a KeptScene, and all policies evaluate batches of cases.
+// Shared procedure of all probes: policies drive equal shares of the scenes, and all policies evaluate batches of cases
+// from sampled states.
 #pragma once
 
 #include <functional>
@@ -20,11 +20,11 @@
 
 namespace pictura {
 
-/// Data of the driven worlds at one step, on the host.
+/// Driven worlds at one step, on the host.
 struct ProbeFrame {
   std::vector<WorldSpec> worlds;
   int step = 0;    // completed steps
-  int driver = 0;  // index of the driving policy; a controller comes after all policies
+  int driver = 0;  // index of the policy; a controller comes after all policies
   std::vector<AgentStatus> status;
   std::vector<AgentClass> agent_class;
   std::vector<int32_t> lane;
@@ -37,7 +37,6 @@ struct ProbeFrame {
 
   ProbeFrame(Simulator& simulator, int step, int driver);
 
-  /// Scenario number of a world.
   int32_t scene_of(size_t world) const {
     return static_cast<int32_t>(worlds[world].global_world - kFirstEvaluationWorld);
   }
@@ -50,40 +49,38 @@ struct ProbeFrame {
   }
 };
 
-/// Scene on the host. Its worlds are copied from frames, which may be of different steps.
+/// Host scene of worlds from frames of any steps.
 struct KeptScene {
   std::vector<int32_t> world_begin{0}, light_begin{0}, hidden;
   std::vector<AgentBox> boxes;
   std::vector<GeometryHandle> geometry;
   std::vector<LightState> lights;
 
-  /// Adds a world, followed by inserted boxes.
+  /// Adds a world, then the inserted boxes.
   void add_world(const ProbeFrame& frame, size_t world, Span<const InsertedBox> inserted = {});
-  /// Return the scene's index of a box in the last added world: the frame's box `box_of_frame`, or the first inserted
-  /// box.
+  /// Return the index of a box of the last added world: the frame's box `box_of_frame`, or the first inserted box.
   int32_t box_of(const ProbeFrame& frame, size_t world, int32_t box_of_frame) const {
     return box_of_frame - frame.box_begin[world] + world_begin[geometry.size() - 1];
   }
   int32_t first_inserted(const ProbeFrame& frame, size_t world) const {
     return box_of(frame, world, frame.box_begin[world + 1]);
   }
-  /// Returns the view of a slot of the last added world. The view does not show the boxes `without`, which are indices
-  /// in this scene.
+  /// Returns a view of the last added world without the boxes `without`, which are indices in this scene.
   View view_of(const ProbeFrame& frame, size_t world, int32_t slot, const std::vector<int32_t>& without);
 };
 
-/// Agent of a frame, observed in two states that differ by at most one box. Either hidden_box is hidden in the second
-/// state, or `inserted` is inserted in the first state, or the states are equal.
+/// Agent observed in two states. Either the second state lacks hidden_box, or the first contains `inserted`, or the
+/// states are equal.
 struct ProbePair {
   size_t world = 0;
   int32_t slot = 0;
   int32_t hidden_box = -1;
   std::optional<InsertedBox> inserted;
-  int32_t measured_box = -1;  // box whose visibility is measured; -1: none, and the visibility is NaN
+  int32_t measured_box = -1;  // box whose visibility is measured; -1: none (NaN)
 };
 
-/// Number of cases still to be drawn in each scene. The scenes' numbers of cases differ by at most one. The cases are
-/// spread evenly over the scene's samples if every sample offers enough cases.
+/// Cases still to be drawn. Scenes differ by at most one case. A scene's cases spread evenly over its samples if every
+/// sample offers enough.
 class CaseQuota {
  public:
   CaseQuota(int64_t cases, const ProbeOptions& options) : cases_(cases), options_(options) {}
@@ -96,48 +93,46 @@ class CaseQuota {
   std::map<int32_t, int64_t> taken_;
 };
 
-/// Properties in which probes differ.
 struct ProbeKind {
-  // Whether policies with fresh weights, drawn from the seed, respond as a control. The trained policies still drive.
+  // Fresh weights, drawn from the seed, respond as a control. The trained policies still drive.
   bool untrained = false;
 };
 
 class ProbeRun final : public EvaluationObserver {
  public:
-  /// Creates a run of sessions that are open on one device; options.policies holds their names. Fills in the results
-  /// that follow from the options and the sessions.
+  /// The sessions are open on one device; options.policies names them. Fills in the results that options and sessions
+  /// determine.
   ProbeRun(const std::vector<PolicySession*>& sessions, const ProbeOptions& options, ProbeResults* results_out,
            const ProbeKind& kind);
   ~ProbeRun() override;
 
-  /// Called before every step, with the worlds and their driver.
+  /// Called before every step.
   using Watch = std::function<void(Simulator& simulator, int driver)>;
 
-  /// Drives all scenes: each policy drives its share, or options.worlds.controller drives all. Passes the worlds'
-  /// states to `sample` after every sample_steps steps. Finally evaluates the remaining pairs, and returns the
-  /// visibility of every pair's measured_box, in the order of add_pairs(). If `watch` is given, only the driver's
-  /// simulator runs, without simulators for other policies' observations, and add_pairs() must not be called.
+  /// Drives all scenes, and passes the states to `sample` every sample_steps steps. Returns the visibility of every
+  /// pair's measured_box, in the order of add_pairs(). With `watch`, only the driver's simulator runs, and add_pairs()
+  /// must not be called.
   std::vector<float> run(const std::function<void(const ProbeFrame&)>& sample, const Watch& watch = {});
 
-  /// Adds pairs of the current frame. Their responses are appended to the results in the order of the pairs.
+  /// Adds pairs of the current frame. Responses are appended to the results in this order.
   void add_pairs(const ProbeFrame& frame, Span<const ProbePair> pairs);
 
-  /// Returns visibilities in the cameras of the first policy that reads images, or in the paper's cameras if no policy
-  /// reads images.
+  /// Returns visibilities in the cameras of the first policy that reads images, or in the paper's cameras without such
+  /// a policy.
   std::vector<float> visibility(const KeptScene& scene, const std::vector<View>& views,
                                 const std::vector<VisibilityQuery>& queries);
-  /// Returns visibilities in a scene that is in the memory of device().
+  /// scene: in the memory of device().
   std::vector<float> visibility(const SceneBatch& scene, const std::vector<View>& views,
                                 const std::vector<VisibilityQuery>& queries);
-  /// Returns the renderer configuration of the cameras in which visibility is measured.
+  /// Cameras of visibility().
   const RendererConfig& cameras() const { return cameras_; }
-  /// Returns the first camera of cameras(), in the ego's frame.
+  /// First camera of cameras(), in the ego's frame.
   const PinholeCamera& front_camera() const { return front_camera_; }
   const CompiledMaps& maps() const { return maps_; }
   Renderer& measuring() { return *measuring_; }
   Device device() const { return device_; }
-  /// Return parts of a policy: the session that responds, the renderer of its images (null if it reads none), and the
-  /// configuration of a simulator that makes the policy's observations.
+  /// Return a policy's responding session, its renderer (null without images), and the configuration of its
+  /// observations.
   PolicySession& session(size_t policy) const;
   Renderer* renderer(size_t policy) const;
   SimulatorConfig world_of(size_t policy) const;
@@ -164,7 +159,7 @@ class ProbeRun final : public EvaluationObserver {
   int64_t batch_ = 0;
   const Stopwatch since_start_;
   CompiledMaps maps_;
-  std::map<bool, std::unique_ptr<ObservedWorlds>> observed_;  // key: whether auxiliary slots are filled
+  std::map<bool, std::unique_ptr<ObservedWorlds>> observed_;  // key: auxiliary slots are filled
   std::vector<Participant> participants_;
   RendererConfig cameras_;
   PinholeCamera front_camera_;
@@ -178,14 +173,12 @@ class ProbeRun final : public EvaluationObserver {
   ProbeResults& results_;
 };
 
-/// Throws UsageError if the number of scenes is not a multiple of the number of policies, or if there is nothing to
-/// sample.
+/// Throws UsageError if the number of scenes is not a multiple of the number of policies, or nothing is sampled.
 void check_probe(const ProbeOptions& options, size_t num_policies);
 
-/// Opens a policy of the options, by its index.
 std::unique_ptr<PolicySession> open_policy(const ProbeOptions& options, size_t policy);
 
-/// Opens options.policies, and calls `probe` with them.
+/// Opens options.policies for `probe`.
 template <typename Results, typename Options>
 Results with_opened(Options options,
                     Results (*probe)(const std::vector<PolicySession*>& sessions, const Options& options)) {
