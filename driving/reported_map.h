@@ -1,4 +1,4 @@
-// Loads maps, and reports repairs of their files on stderr.
+// Maps whose repairs are reported on stderr.
 #pragma once
 
 #include <memory>
@@ -8,11 +8,11 @@
 
 namespace pictura {
 
-/// Returns the map that load_map() loads. Reports on stderr if faults of the file were repaired.
+/// Loads as load_map() does.
 std::shared_ptr<const RoadMap> load_reported_map(const std::string& name);
 
-/// Prints a line on stderr for each kind of repaired fault, with the number of faults, the repair, and the first fault.
-/// `source` is the file's name in messages.
+/// Prints a line for each kind of repaired fault, with count, repair and first fault. `source`: the file's name in
+/// messages.
 void print_repairs(const RoadMap& map, const std::string& source);
 
 }  // namespace pictura
