@@ -1,4 +1,4 @@
-// Film of one simulated world: a view from above, and below it the camera images of one agent.
+// Film of one simulated world: a view from above, and the camera images of one agent below it.
 #pragma once
 
 #include <memory>
@@ -12,27 +12,25 @@
 namespace pictura {
 
 struct FilmOptions {
-  int agent = 0;        // agent that the film follows
-  float width_m = 150;  // width of the view from above around the agent; 0: the whole map
-  /// Settings of the images that a trained policy observes. By default, the film shows the four cameras of paper_rig().
+  int agent = 0;        // followed agent
+  float width_m = 150;  // width of the view around the agent; 0: the whole map
+  /// Settings of the policy's images. Default: the cameras of paper_rig().
   std::optional<RendererConfig> trained_view;
   int num_threads = 0;  // 0: all
 };
 
-/// Settings with which a film draws the images of a policy's cameras. Each picture is as wide as the film's columns.
-/// The minimum width of lines is scaled with the image, so that a line covers equal shares of the picture and of the
-/// policy's image.
+/// Returns settings for drawing a policy's images at the width of the film's columns. The minimum line width is scaled
+/// with the image.
 RendererConfig film_view(const RendererConfig& trained_view);
 
-/// Order of a rig's cameras in a film: cameras from left to right, then cameras that face backwards.
+/// Returns the rig's cameras from left to right, then those that face backwards.
 std::vector<int> film_order(const Rig& rig);
 
 class Film {
  public:
-  /// Opens the file. The file name's ending selects the format, .mp4 or .gif. Throws Error naming the path.
+  /// The path's ending selects the format, .mp4 or .gif. Throws Error naming the path.
   Film(const std::string& path, const Simulator& simulator, const FilmOptions& options);
   ~Film();
-  /// Adds the simulator's current state.
   void add_frame(Simulator& simulator);
   /// Completes the file; without this call, no file remains.
   void close();

@@ -1,4 +1,4 @@
-// Shapes of lanes from above: their outlines, and the order in which they cover each other. Needs no canvas.
+// Outlines and drawing order of lanes.
 #pragma once
 
 #include <vector>
@@ -7,11 +7,11 @@
 
 namespace pictura {
 
-/// Returns the indices of all lanes, bottom first. Higher levels cover lower levels, so that bridges are drawn above
-/// the road that they cross. Within a level, driving lanes cover the lanes that they cross.
+/// Returns the lane indices, bottom first. Higher levels cover lower ones. Within a level, driving lanes cover the
+/// lanes that they cross.
 std::vector<int32_t> lanes_in_drawing_order(const RoadMap& map);
 
-/// Returns the ring around a lane: its left border in the direction of travel, then its right border backwards.
+/// Returns the ring of the left border forwards, then the right border backwards.
 std::vector<Vec2> outline_of(const RoadMap& map, const Lane& lane);
 
 }  // namespace pictura

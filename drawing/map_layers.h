@@ -1,5 +1,4 @@
-// Painting of the static parts of a map from above, for pictures of maps and for films of worlds. Private to the
-// drawing library.
+// Static parts of a map from above. Private to the drawing library.
 #pragma once
 
 #include <vector>
@@ -16,22 +15,19 @@ constexpr Rgb kRoadEdgeInk = hex(0xC8312F);
 constexpr Rgb kStopLineInk = hex(0xFFFFFF);
 constexpr Rgb kParkingSpaceInk = hex(0xC9D2DE);
 
-/// Bounding box of a map's lanes, road edges, markings and parking spaces. Throws Error when the map has none of these.
-/// Nearly all other parts of a map are inside the box.
+/// Bounding box of lanes, road edges, markings and parking spaces. Throws Error when the map has none of these.
 Aabb2 bounds_of(const RoadMap& map);
 
-/// Colour of a lane's surface from above.
 Rgb lane_color(LaneType type);
 
-/// Colour of a painted line from above.
 Rgb paint_color(MarkColor color);
 
-/// Colour of a phase (the stop lines of a junction that are green together), for stop lines and heads without a known
-/// state.
+/// Colour of a phase, for stop lines and heads without a known state. A phase is the stop lines of a junction that are
+/// green together.
 Rgb phase_color(int phase);
 
-/// Drawing on a canvas in the metres of a map. The canvas's top left pixel is at left_top_m, and north is up. The
-/// destructor restores the canvas's units.
+/// Draws in map metres. The canvas's top left pixel is at left_top_m, and north is up. The destructor restores the
+/// canvas's units.
 class GroundPen {
  public:
   GroundPen(Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m);
@@ -42,9 +38,9 @@ class GroundPen {
   Canvas& canvas() { return canvas_; }
   cairo_t* context() { return canvas_.context(); }
   double px_per_m() const { return px_per_m_; }
-  /// Returns the larger of a size in metres and a size in pixels, in metres.
+  /// Returns the larger of both sizes, in metres.
   double at_least(double metres, double min_px) const;
-  /// Whether the bounding box touches the canvas.
+  /// Whether the box touches the canvas.
   bool is_visible(const Aabb2& box) const;
   bool is_visible(const Eigen::Vector2d& position, double margin_m) const;
 
@@ -52,7 +48,7 @@ class GroundPen {
   void line_to(const Eigen::Vector2d& p) { cairo_line_to(context(), p.x(), p.y()); }
   void line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, double width_m, Rgb color, double alpha = 1);
   void disk(const Eigen::Vector2d& center, double radius_m, Rgb color, double alpha = 1);
-  /// Draws text at a position. Its size is in pixels, independent of the scale.
+  /// Draws text with a size in pixels.
   void label(const Eigen::Vector2d& position, const std::string& words, const TextStyle& style);
 
  private:
@@ -62,12 +58,12 @@ class GroundPen {
   Aabb2 visible_;
 };
 
-/// Paints lanes, parking spaces, crosswalks, markings, painted stop lines and road edges, without lights.
+/// Paints lanes, parking spaces, crosswalks, markings, stop lines and road edges, without lights.
 class MapLayers {
  public:
   explicit MapLayers(const RoadMap& map);
 
-  /// Paints all layers, with left_top_m at the top left pixel of the canvas. Parts outside the canvas are skipped.
+  /// left_top_m: place of the canvas's top left pixel.
   void paint(Canvas& canvas, const Eigen::Vector2d& left_top_m, double px_per_m) const;
 
  private:
@@ -83,7 +79,7 @@ class MapLayers {
   std::vector<Aabb2> marking_boxes_;     // [markings]
 };
 
-/// Paints a light's stop line in `color`, and its head as a disk with a pointer towards its traffic.
+/// Paints a stop line in `color`, and its light head as a disk with a pointer towards the traffic.
 void paint_light(Canvas& canvas, const TrafficLight& light, const Eigen::Vector2d& left_top_m, double px_per_m,
                  Rgb color);
 

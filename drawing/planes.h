@@ -1,4 +1,4 @@
-// Pictures of an image's optional planes: depth, class and instance.
+// Pictures of an image's depth, class and instance.
 #pragma once
 
 #include <string>
@@ -9,12 +9,12 @@ namespace pictura {
 
 enum class Plane { depth, class_id, instance_id };
 
-/// Returns the plane named "depth", "class" or "instance". Throws UsageError for other names.
+/// Throws UsageError for names other than "depth", "class" and "instance".
 Plane plane_by_name(const std::string& name);
 
 /// Draws a plane of one image, black at pixels without a surface. Depth: grey 255 x (1 - depth / 120 m), at least 1.
-/// Class: the colour of the object's kind in docs/explanation/image.md; vehicles have the colour of their right side.
-/// Instance: a different hue for each agent, and black elsewhere.
+/// Class: colours of docs/explanation/image.md; vehicles have the colour of their right side. Instance: one hue per
+/// agent, black elsewhere.
 RgbImage plane_picture(const HostImages& images, int view, int camera, Plane plane);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Writer of videos, which sends frames of raw pixels to the ffmpeg program.
+// Video writer that sends raw frames to ffmpeg.
 #pragma once
 
 #include <memory>
@@ -8,21 +8,20 @@
 
 namespace pictura {
 
-/// Writer of one video, frame by frame. The file has its name only after finish() has returned; an unfinished video
-/// leaves no file. The extension selects the format: .mp4 (H.264, yuv420p) or .gif (one palette per video). If a side
-/// of an .mp4 is odd, its last row or column is dropped. An object must be used by one thread only.
+/// Writes a .mp4 (H.264, yuv420p) or .gif (one palette per video). The file appears when finish() returns; an
+/// unfinished video leaves no file. An odd side of an .mp4 loses its last row or column. Use an object in one thread
+/// only.
 class VideoWriter {
  public:
-  /// Throws UsageError for any other extension. Throws Error if the folder is not writable or ffmpeg cannot be started.
+  /// Throws UsageError for other extensions, and Error if the folder is not writable or ffmpeg does not start.
   VideoWriter(const std::string& path, int width_px, int height_px, double frames_per_s);
   ~VideoWriter();
   VideoWriter(const VideoWriter&) = delete;
   VideoWriter& operator=(const VideoWriter&) = delete;
 
-  /// Adds a frame. Throws Error if the frame has another size. If ffmpeg has ended, throws Error with ffmpeg's last
-  /// line of output.
+  /// Throws Error if the frame has another size. If ffmpeg has ended, throws Error with its last line of output.
   void add(const RgbImage& frame);
-  /// Completes the video and gives the file its name. Throws Error if ffmpeg failed or no frame was added.
+  /// Completes the file. Throws Error if ffmpeg failed or no frame was added.
   void finish();
 
  private:
