@@ -1,5 +1,4 @@
-// Encodings that replay files use: whole numbers of variable length and their differences, zlib streams, and base64
-// text.
+// Encodings of replay files.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +10,15 @@
 
 namespace pictura {
 
-/// Appends a number in groups of 7 bits, the lowest group first. Numbers of small magnitude take few bytes.
+/// Appends a number in groups of 7 bits, lowest first. Small magnitudes take few bytes.
 void put_number(int32_t value, std::string* bytes_inout);
 
-/// Reads numbers that put_number() wrote. Throws Error if the bytes end within a number, or if put_number() cannot have
-/// written them.
+/// Reads numbers of put_number(). Throws Error for other or incomplete bytes.
 class NumberReader {
  public:
   explicit NumberReader(std::string_view bytes) : bytes_(bytes) {}
   int32_t next();
-  /// Reads a count of items. Throws Error if it exceeds the remaining bytes, because each item takes at least one byte.
+  /// Throws Error if the count exceeds the remaining bytes, because each item takes at least one.
   int32_t next_count();
   bool is_at_end() const { return at_ == bytes_.size(); }
 
@@ -29,19 +27,18 @@ class NumberReader {
   std::size_t at_ = 0;
 };
 
-/// Writes `count` numbers as differences of order 0 to 2. The numbers begin at `first` and are `stride` apart. The
-/// number before the first counts as 0.
+/// Writes numbers from `first` on, `stride` apart, as differences of order 0 to 2. The number before the first counts
+/// as 0.
 void put_differences(const int32_t* first, std::size_t count, std::size_t stride, int order, std::string* bytes_inout);
-/// Reads the numbers that put_differences() wrote with the same count and order.
+/// Inverse of put_differences() with the same count and order.
 void read_differences(NumberReader* reader, std::size_t count, std::size_t stride, int order, int32_t* first_out);
 
-/// Compresses bytes to a zlib stream.
 std::string deflate(std::string_view bytes);
-/// Decompresses a zlib stream of exactly `size` bytes. Throws Error if the stream is damaged or has another size.
+/// Throws Error if the zlib stream is damaged or has another size.
 std::string inflate(std::string_view stream, std::size_t size);
 
 std::string base64(std::string_view bytes);
-/// Decodes base64. Throws Error if base64() cannot have written the text.
+/// Throws Error if base64() cannot have written the text.
 std::string from_base64(std::string_view text);
 
 }  // namespace pictura

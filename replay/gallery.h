@@ -1,4 +1,4 @@
-// Index page of the replays in a folder.
+// Index page of a folder's replays.
 #pragma once
 
 #include <string>
@@ -7,12 +7,11 @@
 
 namespace pictura {
 
-/// Checks a folder before replays are written to it. Throws Error, which names the file, if a page (*.html) in the
-/// folder is not a replay, or if its index.html is not a gallery.
+/// Throws Error naming a page (*.html) that is not a replay, or an index.html that is not a gallery.
 void check_gallery(const std::string& folder);
 
-/// Writes FOLDER/index.html, which lists the replays (*.html) in the folder, the worst first. Returns the number of
-/// replays. Throws Error as check_gallery() does.
+/// Writes FOLDER/index.html, the worst replay first. Returns the number of replays. Throws Error as check_gallery()
+/// does.
 int write_gallery(const std::string& folder);
 
 }  // namespace pictura

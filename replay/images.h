@@ -1,6 +1,5 @@
-// Lossless compression of a replay's images. Most pixels equal the pixel to their left, above them, or in the previous
-// image. Most other pixels have one of a few hues at some brightness. An adaptive arithmetic coder encodes which case
-// applies to each pixel; docs/reference/replay.md defines the format. Each group of frames can be decoded separately.
+// Lossless compression of a replay's images with an adaptive arithmetic coder; docs/reference/replay.md defines the
+// format. Each group of frames can be decoded separately.
 #pragma once
 
 #include <cstdint>
@@ -14,19 +13,17 @@ namespace pictura {
 
 constexpr int kReplayFramesPerGroup = 25;
 
-/// Returns the colours of drawn primitives before distance fades them.
+/// Returns the colours of primitives before distance fades them.
 std::vector<ReplayHue> replay_hues();
 
-/// Returns a colour in bytes.
 ReplayHue replay_hue(Rgb color);
 
-/// Returns the size of a frame in bytes. A frame is [height, width, 3] for each camera, one camera after the other.
+/// Returns the size of a frame: [height, width, 3] bytes per camera.
 size_t bytes_of_frame(const std::vector<ReplayCamera>& cameras);
 
-/// Compresses one or more complete frames.
 std::string pack_images(const std::vector<ReplayCamera>& cameras, std::string_view frames);
 
-/// Decompresses the `count` frames of a group. Throws Error if the group is damaged.
+/// Throws Error if the group is damaged.
 std::string unpack_images(const std::vector<ReplayCamera>& cameras, std::string_view group, int count);
 
 }  // namespace pictura

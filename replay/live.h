@@ -1,4 +1,4 @@
-// Messages between a running world and the browser pages that show it: the world's state, and the requests of viewers.
+// Messages between a running world and browser pages.
 #pragma once
 
 #include <memory>
@@ -16,7 +16,7 @@ namespace pictura {
 
 using LiveJson = nlohmann::ordered_json;
 
-/// Observes the only world of a simulator in host memory, and keeps only the world's newest frame.
+/// Newest frame of the only world of a simulator in host memory.
 class LiveWorld final : public StepObserver {
  public:
   /// The simulator must outlive this object.
@@ -26,9 +26,9 @@ class LiveWorld final : public StepObserver {
   void after_step(const StepResult& result) override;
   void after_reset(Span<const uint8_t> world_mask) override;
 
-  /// Returns a message with all data that a page needs to begin at this frame.
+  /// Returns all data for a page to begin at this frame.
   LiveJson begin() const;
-  /// Returns a message with the newest frame, for pages that have the previous frame.
+  /// Returns the newest frame for pages that have the previous one.
   LiveJson frame() const;
   LiveJson agent_message(const std::optional<ReplayDecision>& decision, int agent);
 
@@ -36,8 +36,7 @@ class LiveWorld final : public StepObserver {
   int64_t step() const { return step_; }
 
  private:
-  /// Discards all frames of the recording except the newest. `num_episodes` is the number of episodes in the recording
-  /// before that frame was added.
+  /// Keeps only the newest frame. `num_episodes`: episodes before that frame was added.
   void keep_newest(size_t num_episodes);
 
   Recorder recorder_;
@@ -46,13 +45,13 @@ class LiveWorld final : public StepObserver {
   bool begins_episode_ = false;
 };
 
-/// Request of a page. Members without a value change nothing.
+/// Request of a page; empty members change nothing.
 struct LiveRequest {
   std::optional<bool> paused;
-  std::optional<int> steps;  // steps to take while paused
+  std::optional<int> steps;  // while paused
   std::optional<double> pace;
   std::optional<int> watched;  // agent whose images and decisions are sent
-  std::optional<int> driven;   // agent that the viewer drives by keys, or -1
+  std::optional<int> driven;   // agent that the viewer's keys drive, or -1
   std::optional<DrivingKeys> keys;
 };
 
@@ -60,7 +59,7 @@ constexpr int kMaxLiveSteps = 1000;
 constexpr double kMinLivePace = 0.05, kMaxLivePace = 64;
 
 /// Parses {"paused": bool, "steps": 1 to kMaxLiveSteps, "pace": number, "watch": agent, "drive": agent or -1, "keys":
-/// ["forward", "backward", "stop", "left", "right"]}. Throws Error, which names the member, if a member is invalid.
+/// ["forward", "backward", "stop", "left", "right"]}. Throws Error naming an invalid member.
 LiveRequest parse_live_request(std::string_view text, int num_agents);
 
 }  // namespace pictura

@@ -1,5 +1,4 @@
-// Live view of a running world. Pages in a browser watch the world, pause it, step it, and drive an agent. The view
-// executes their requests, and paces the steps.
+// Live view of a running world, which browser pages watch, pause, step, and drive.
 #pragma once
 
 #include <chrono>
@@ -18,37 +17,35 @@ namespace pictura {
 
 struct LiveViewOptions {
   int port = 0;  // 0: any free port
-  // If set, the view listens on all addresses, and accepts requests to this name of the machine.
+  // If set, listens on all addresses, and accepts requests to this host name.
   std::string host_name;
-  int watched = 0;             // agent whose decisions and images pages receive at first
+  int watched = 0;             // initial agent whose decisions and images are sent
   RendererConfig cameras;      // cameras of every agent
-  bool sends_images = false;   // sends images of the watched agent; else pages draw them
-  bool waits_for_page = true;  // the first step waits for the first page
+  bool sends_images = false;   // else pages draw images
+  bool waits_for_page = true;  // the first step waits for a page
 };
 
 class LiveView final : public StepObserver {
  public:
-  /// Function that returns the policy's response to the agent's current state, or nothing if no policy drives the
-  /// agent.
+  /// Returns the policy's response to the agent's state, or nothing without a policy.
   using Decide = std::function<std::optional<ReplayDecision>(int agent)>;
 
-  /// Serves the only world of a simulator in host memory. The simulator must outlive the view. Throws UsageError if
-  /// this build lacks the server, or if the watched agent does not exist, and Error if the port is in use.
+  /// Serves the only world of a simulator in host memory, which must outlive the view. Throws UsageError if this build
+  /// lacks the server or the watched agent does not exist, and Error if the port is in use.
   LiveView(Simulator& simulator, const LiveViewOptions& options, const ReplayOrigin& origin, Decide decide);
   ~LiveView() override;
 
-  /// Returns the URL of the page, which contains a secret.
+  /// Returns the page's URL, which contains a secret.
   const std::string& address() const;
   int num_pages() const;
 
-  /// Executes the pages' requests, then waits for at most 50 ms until the next step is due. Returns whether it is due.
+  /// Executes the pages' requests, then waits up to 50 ms for the next step. Returns whether it is due.
   bool is_due() override;
-  /// If a viewer drives an agent, sets this agent's command from the pressed keys. The commands are [slots].
+  /// Sets the command of an agent that a viewer drives. commands_inout: [slots].
   void override_commands(Span<Command> commands_inout) override;
   void before_step(Span<const Command> commands) override;
   void after_step(const StepResult& result) override;
   void after_reset(Span<const uint8_t> world_mask) override;
-  /// Notifies pages that the simulation has ended. The pages keep the frames that they have received.
   void finish();
 
  private:

@@ -1,4 +1,4 @@
-// Converts a map to the form of replays: its shapes from above, and the geometry that cameras see.
+// Maps in the form of replays.
 #pragma once
 
 #include <vector>
@@ -8,11 +8,10 @@
 
 namespace pictura {
 
-/// Returns the shapes in drawing order. Traffic lights come last, in the order of the map.
+/// Returns the shapes from above in drawing order, traffic lights last in the map's order.
 std::vector<ReplayShape> map_shapes(const CompiledMap& map);
 
-/// Returns the geometry that renderers draw. If a strip continues the previous strip, it extends the previous strip's
-/// line.
+/// Returns the geometry that cameras see. A strip that continues the previous strip extends its line.
 ReplayScenery map_scenery(const StaticGeometry& geometry);
 
 }  // namespace pictura

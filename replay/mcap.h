@@ -1,5 +1,4 @@
-// Writes replays as MCAP files, for Foxglove and other readers of that format. Messages are JSON with Foxglove's
-// schemas.
+// Replays as MCAP files with JSON messages in Foxglove's schemas.
 #pragma once
 
 #include <string>
@@ -9,8 +8,7 @@
 
 namespace pictura {
 
-/// Writes the file, completely or not at all. docs/reference/replay.md lists its topics. Times begin at 0. Throws
-/// Error, which names the path, if the file cannot be written.
+/// Writes the complete file or nothing, see docs/reference/replay.md. Times begin at 0. Throws Error naming the path.
 void write_mcap(const std::string& path, const Replay& replay);
 
 }  // namespace pictura

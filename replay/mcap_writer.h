@@ -1,5 +1,4 @@
-// Writer of MCAP files (https://mcap.dev/spec): schemas, channels, messages in uncompressed chunks, and the indexes
-// that readers use to seek.
+// Writer of MCAP files (https://mcap.dev/spec) with uncompressed chunks and indexes.
 #pragma once
 
 #include <cstdint>
@@ -15,15 +14,15 @@ namespace pictura {
 
 class McapWriter {
  public:
-  /// Opens the file. All functions that write throw Error, which names the path, if writing fails.
+  /// All functions that write throw Error naming the path.
   McapWriter(const std::string& path, std::string_view library);
 
-  /// Adds a topic of JSON messages, with a schema in JSON Schema. Returns the topic's channel.
+  /// Adds a topic with a JSON Schema. Returns its channel.
   uint16_t add_channel(std::string_view topic, std::string_view schema_name, std::string_view schema);
-  /// Adds entries (names and texts) that describe the whole file.
+  /// Adds entries that describe the whole file.
   void add_metadata(std::string_view name, const std::vector<std::pair<std::string, std::string>>& entries);
   void add_message(uint16_t channel, uint64_t time_ns, std::string_view json);
-  /// Writes the remaining records, and renames the file to `path`.
+  /// Completes the file, and renames it to `path`.
   void finish();
 
  private:
@@ -36,12 +35,12 @@ class McapWriter {
 
   OutputFile file_;
   uint64_t offset_ = 0;
-  std::string definitions_;  // schemas and channels, repeated in the summary
+  std::string definitions_;  // schemas and channels, for the summary
   std::string metadata_indexes_;
   uint16_t num_channels_ = 0;
   std::string chunk_;
   uint64_t first_ns_ = 0, last_ns_ = 0;
-  // Times and offsets of the chunk's messages, by channel.
+  // Times and offsets of messages, by channel.
   std::map<uint16_t, std::vector<std::pair<uint64_t, uint64_t>>> entries_;
   std::map<uint16_t, uint64_t> counts_;
   std::vector<ChunkIndex> chunks_;

@@ -1,4 +1,4 @@
-// Page templates of replay/page/, which the build embeds (cmake/EmbedTexts.cmake).
+// Templates of replay/page/, embedded by cmake/EmbedTexts.cmake.
 #pragma once
 
 #include <string_view>

@@ -1,6 +1,5 @@
-// Web server for pages that watch a running world. It serves a page at an unguessable URL, sends server-sent events to
-// the page, and receives requests from it. The server never waits for a page. A page that reads too slowly misses
-// messages, and receives the complete state when it has caught up.
+// Web server for pages that watch a running world. The URL is unguessable. The server never waits for a page: a slow
+// page misses messages, then receives the complete state.
 #pragma once
 
 #include <chrono>
@@ -17,49 +16,44 @@ namespace pictura {
 
 struct LiveServerOptions {
   int port = 0;  // 0: any free port
-  // If set, the server listens on all addresses, and accepts requests to this name and to the loopback's names.
+  // If set, listens on all addresses, and accepts requests to this name and the loopback's names.
   std::string host_name;
-  int num_agents = 0;  // agents in requests must be below this number
+  int num_agents = 0;  // exclusive limit of agents in requests
 };
 
-/// Maximum number of pages that watch a world at the same time.
+/// Maximum number of simultaneous pages.
 constexpr int kMaxLivePages = 8;
-/// Maximum numbers of messages and bytes that wait for a page.
+/// Maximum waiting messages and bytes of a page.
 constexpr size_t kMaxWaitingMessages = 256, kMaxWaitingBytes = size_t{32} << 20;
 
 class LiveServer {
  public:
-  /// Starts listening, in separate threads. Throws UsageError if the host name has characters other than letters,
-  /// digits, dots and hyphens, and Error if the port is in use.
+  /// Listens in separate threads. Throws UsageError if the host name has characters other than letters, digits, dots
+  /// and hyphens, and Error if the port is in use.
   explicit LiveServer(const LiveServerOptions& options);
-  /// Closes all connections.
   ~LiveServer();
 
-  /// Returns the URL of the page, which contains a secret.
+  /// Returns the page's URL, which contains a secret.
   const std::string& address() const;
 
-  /// Sends an event to all pages that have received the initial events and are not too slow. Calls `message`, which
-  /// returns the event's data, only if there is such a page. Never waits.
+  /// Sends an event to all pages that have the initial events and are not too slow. Calls `message` only if such a page
+  /// exists. Never waits.
   void send(std::string_view event, const std::function<LiveJson()>& message);
-  /// Whether any page needs send_initial_events(). A new page needs it, and so does a page that was too slow and has
-  /// since read all messages that waited for it.
+  /// Whether a page needs send_initial_events(): a new page, or a slow page that has read all its waiting messages.
   bool has_ungreeted_pages() const;
-  /// An event for send_initial_events().
   struct Message {
     std::string_view event;
     LiveJson data;
   };
-  /// Sends these events to the pages that need them; see has_ungreeted_pages(). From then on, these pages receive the
-  /// events of send().
+  /// Sends these events to the pages that need them. send() then includes these pages.
   void send_initial_events(const std::vector<Message>& messages);
 
-  /// Returns the requests since the last call, in the order of their arrival.
+  /// Returns the requests since the last call, in order of arrival.
   std::vector<LiveRequest> take_requests();
-  /// Waits until there is a request or has_ungreeted_pages() is true, but at most until `end`.
+  /// Waits until there is a request, has_ungreeted_pages() is true, or `end`.
   void wait_until(std::chrono::steady_clock::time_point end);
-  /// Returns the number of listening pages.
   int num_pages() const;
-  /// Waits until all messages to all pages have been written, but at most for `patience`.
+  /// Waits at most `patience` until all messages are written.
   void flush(std::chrono::milliseconds patience);
 
  private:

@@ -1,4 +1,4 @@
-// Conversion to the whole units of replays: centimetres, tenths of a degree, and other units.
+// Conversion to the whole units of replays.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// Returns the nearest whole number of units, clamped to the range of int32.
+/// Returns the nearest whole number of units, clamped to int32.
 inline int32_t in_units(double value, double unit) {
   constexpr double kMost = std::numeric_limits<int32_t>::max();
   return static_cast<int32_t>(std::lround(std::clamp(value / unit, -kMost, kMost)));
