@@ -1,4 +1,4 @@
-// Options that select simulators, renderers and devices.
+// Options of simulators, renderers and devices.
 #pragma once
 
 #include <string>
@@ -10,16 +10,16 @@
 
 namespace pictura {
 
-/// Returns a validator that accepts only these names. Its error message lists them.
+/// The error lists the names.
 CLI::Validator one_of(const std::vector<std::string>& names);
 
 /// Adds --simulator, --renderer (or --backend) and --samples. Their help gives `otherwise` as the default.
 void add_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out);
 
-/// Adds the options of add_backend_options(), and --device for the policy's device.
+/// Adds the options of add_backend_options(), and --device.
 void add_policy_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out);
 
-/// Returns overrides of a training configuration for the options that were given.
+/// Returns overrides of a training configuration.
 std::vector<std::string> overrides_of(const SessionOptions& options);
 
 }  // namespace pictura

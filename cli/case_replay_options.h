@@ -1,4 +1,4 @@
-// Options of `pictura probe` that write a case of the probe as a replay.
+// Options of `pictura probe` for the replay of a case.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// Adds --replay, --case (with the help `case_help`) and --cameras.
+/// Adds --replay, --case (with help `case_help`) and --cameras.
 void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out, const std::string& case_help);
 
 }  // namespace pictura

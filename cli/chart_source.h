@@ -1,4 +1,4 @@
-// Text of bindings/pictura/plot.py, which the build embeds (cmake/EmbedTexts.cmake).
+// Text of bindings/pictura/plot.py, embedded by cmake/EmbedTexts.cmake.
 #pragma once
 
 #include <string_view>

@@ -1,4 +1,4 @@
-// Generates scripts for shell completion from the tree of the command's subcommands and options.
+// Scripts for shell completion.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// Returns the script for "bash", "zsh" or "fish". Throws UsageError for other shells.
+/// Throws UsageError for shells other than "bash", "zsh" and "fish".
 std::string completion_script(const CLI::App& app, const std::string& shell);
 
 }  // namespace pictura

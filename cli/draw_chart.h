@@ -1,5 +1,4 @@
-// Draws charts with bindings/pictura/plot.py, which uses Matplotlib. This program contains the text of plot.py, and
-// runs it with a Python interpreter.
+// Charts by bindings/pictura/plot.py.
 #pragma once
 
 #include <string_view>
@@ -11,20 +10,18 @@
 
 namespace pictura {
 
-/// Error thrown if Python or Matplotlib is missing. Its message explains how to install them, and where the chart's
-/// data is.
+/// Error: Python or Matplotlib is missing. The message explains the installation, and locates the chart's data.
 class NoMatplotlib : public Error {
  public:
   using Error::Error;
 };
 
-/// Runs plot.py on a request. The request contains a chart's name ("chart"), its arguments, and optionally the name of
-/// the picture ("out") and the text to print ("report"). The interpreter is $PICTURA_PYTHON if set, else the
-/// interpreter of the virtual environment with which this program was built, else python3. Throws NoMatplotlib,
-/// Interrupted, or Error with plot.py's message.
+/// Runs plot.py. The request contains the chart's name ("chart"), its arguments, and optionally a picture's name
+/// ("out") and a text to print ("report"). The interpreter is $PICTURA_PYTHON, else that of the build's virtual
+/// environment, else python3. Throws NoMatplotlib, Interrupted, or Error with plot.py's message.
 void draw_chart(const Json& request);
 
-/// Returns the colours of a list in plot.py, such as SERIES_COLORS, for pictures that accompany charts.
+/// Returns the colours of a list in plot.py, such as SERIES_COLORS.
 std::vector<Rgb> chart_colors(std::string_view name);
 
 }  // namespace pictura

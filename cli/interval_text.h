@@ -1,4 +1,4 @@
-// Text of estimates with confidence intervals.
+// Text of confidence intervals.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// Returns an estimate and the half width of its 95 % interval, such as "0.123 +- 0.045". A missing number becomes "-".
+/// Returns an estimate and its half width, such as "0.123 +- 0.045". A missing number becomes "-".
 std::string interval_text(const Estimate& estimate, int decimals = 3);
 
 }  // namespace pictura

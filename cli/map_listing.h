@@ -1,4 +1,4 @@
-// Lists every element of a map with its source in the file, for `pictura map --json --full`.
+// Listing of a map's elements for `pictura map --json --full`.
 #pragma once
 
 #include "pictura/cli/report.h"
@@ -6,9 +6,8 @@
 
 namespace pictura {
 
-/// Prints one JSON object. It contains the keys of `facts`, then `elements`, with an array for each vector of RoadMap
-/// and one element per line. Positions are file coordinates in metres, and indices refer to the arrays. `source`
-/// contains the element's road, line in the file, section and lane, as far as they are known.
+/// Prints a JSON object: `facts`, then `elements` with an array per vector of RoadMap, one element per line. Positions
+/// are file coordinates in metres. `source` contains the known road, file line, section and lane.
 void print_listing(const Json& facts, const RoadMap& map);
 
 }  // namespace pictura

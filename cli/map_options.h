@@ -8,9 +8,8 @@
 
 namespace pictura {
 
-/// Adds --map, which takes one word with names that are separated by commas, and may be given several times. Commas in
-/// a name such as procedural:7:blocks=4x3,roundabouts=1 or FILE.osm@49.0,8.4 belong to the name. Ranges of seeds are
-/// expanded.
+/// Adds --map: names separated by commas, also given repeatedly. Commas within names such as FILE.osm@49.0,8.4 are
+/// kept. Seed ranges are expanded.
 CLI::Option* add_map_list_option(CLI::App* command, std::vector<std::string>* maps, const std::string& help);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Options that take numbers. The parser of common/support/numbers.h reads them, because CLI11's own parser reads 010 as
-// octal, wraps -1, saturates 2^64, and accepts NaN in any range.
+// Options that take numbers, parsed by common/support/numbers.h. CLI11's own parser reads 010 as octal, wraps -1,
+// saturates 2^64, and accepts NaN.
 #pragma once
 
 #include <cstdint>
@@ -14,15 +14,15 @@ namespace pictura {
 
 constexpr uint64_t kMaxCount = std::numeric_limits<int>::max();
 
-/// Returns a validator that accepts whole numbers from low to high, inclusive, in any decimal notation. Pass it to
-/// Option::transform(), so that CLI11 reads only plain digits.
+/// Accepts whole numbers from low to high, inclusive, in any decimal notation. Pass it to Option::transform(), which
+/// gives CLI11 plain digits.
 CLI::Validator whole_number(uint64_t low, uint64_t high = kMaxCount);
 
-/// Returns a validator that accepts finite numbers from low to high, inclusive. Pass it to Option::transform().
+/// Accepts finite numbers from low to high, inclusive. Pass it to Option::transform().
 CLI::Validator number(double low, double high);
 
-/// Adds an option that takes a number from low to high, which must be whole if T is an integer type. The help shows the
-/// initial `value` as the default. A default out of range means "not given", and the help does not show it.
+/// Adds a number from low to high, whole if T is an integer type. The help shows `value` as the default unless it is
+/// out of range, which means "not given".
 template <typename T>
 CLI::Option* add_number_option(CLI::App* command, const std::string& flag, T& value, const std::string& help,
                                double low, double high = kMaxCount) {
@@ -36,10 +36,9 @@ CLI::Option* add_number_option(CLI::App* command, const std::string& flag, T& va
   return option;
 }
 
-/// Adds --seed, any unsigned 64-bit number.
 CLI::Option* add_seed_option(CLI::App* command, uint64_t* seed_out, const std::string& help);
 
-/// Adds --threads, from 0 (all processors) to kMaxThreads.
+/// Adds --threads; 0: all processors.
 CLI::Option* add_threads_option(CLI::App* command, int* num_threads_out);
 
 }  // namespace pictura

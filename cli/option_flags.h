@@ -1,4 +1,4 @@
-// Command-line flags for lists of options. Structs define such a list by a function visit_options().
+// Command-line flags for the options that visit_options() lists.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@
 
 namespace pictura {
 
-/// Visitor of a list of options. It adds a flag for each option to a command.
+/// Adds a flag for each visited option.
 class FlagAdder {
  public:
   explicit FlagAdder(CLI::App* command) : command_(command) {}

@@ -1,4 +1,4 @@
-// Options of commands that record replays.
+// Options of replay recordings.
 #pragma once
 
 #include <string>
@@ -11,9 +11,9 @@ namespace pictura {
 
 /// Adds --follow and --cameras.
 void add_recording_options(CLI::App* command, RecordingOptions* options_out);
-/// Adds only --cameras, for replays whose followed agent cannot be chosen.
+/// Adds only --cameras.
 CLI::Option* add_cameras_option(CLI::App* command, RecordingOptions* options_out);
-/// Throws UsageError if one of these options was given, because they have no effect without the option `needed`.
+/// Throws UsageError if one of these options was given without the option `needed`.
 void reject_recording_options(const CLI::App& command, const std::string& needed);
 
 }  // namespace pictura

@@ -1,5 +1,4 @@
-// Output of commands: results on stdout, which may be one JSON object, and a progress line with the remaining time on
-// stderr.
+// Output of commands: results on stdout, and a progress line on stderr.
 #pragma once
 
 #include <optional>
@@ -13,29 +12,25 @@
 
 namespace pictura {
 
-/// Prints one object and a newline to stdout.
 void print_json(const Json& object);
 
-/// Prints a warning "what: text" for each text. If there are more than ten texts, prints ten of them and the number of
-/// the others.
+/// Prints "what: text" for up to ten texts, and the number of others.
 void print_warnings(const std::string& what, const std::vector<std::string>& texts);
 
-/// Returns the text of a duration, such as "1 h 02 min", "3 min 05 s" or "12 s".
+/// Such as "1 h 02 min", "3 min 05 s" or "12 s".
 std::string format_duration(double seconds);
 
-/// Returns the text of a count, such as "1.20 M", "34.5 K" or "678".
+/// Such as "1.20 M", "34.5 K" or "678".
 std::string format_count(double value);
 
-/// Progress line on stderr. On a terminal it is rewritten in place, and cut off at the width of the terminal. Elsewhere
-/// it is printed every ten seconds.
+/// Progress line on stderr: rewritten in place on a terminal, else printed every ten seconds.
 class ProgressLine {
  public:
   ~ProgressLine();
   void update(const std::string& text);
-  /// Updates the text, and appends the estimated remaining time. `done` is the completed fraction of the work since the
-  /// line was created.
+  /// Appends the remaining time. `done`: completed fraction since construction.
   void update(const std::string& text, double done);
-  /// Prints the last text so that it remains visible.
+  /// Prints the last text permanently.
   void finish();
 
  private:
@@ -45,14 +40,14 @@ class ProgressLine {
   Stopwatch since_start_;
 };
 
-/// Pair of numbers, written as "AxB".
+/// Numbers of "AxB".
 struct Pair {
   int first, second;
 };
-/// Parses "AxB" with both numbers in [1, max]. Throws UsageError, which names the option, for other texts.
+/// Parses "AxB" with both numbers in [1, max]. Throws UsageError naming the option.
 Pair parse_pair(const std::string& option, const std::string& text, int max);
 
-/// Parses "4" (MSAA) or "4x4" (supersampling). Throws UsageError, which names the option, for other texts.
+/// Parses "4" (MSAA) or "4x4" (supersampling). Throws UsageError naming the option.
 PixelSamples parse_samples(const std::string& option, const std::string& text);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Options of commands that show a live view.
+// Options of live views.
 #pragma once
 
 #include <CLI/CLI.hpp>
