@@ -1,5 +1,4 @@
-// Exchange of arrays between C++ and Python without copies. `pictura.Array` gives Python access to the library's memory
-// through DLPack and NumPy. Arrays of Python callers are accessed through DLPack.
+// Exchange of arrays between C++ and Python without copies.
 #pragma once
 
 #include <memory>
@@ -19,21 +18,19 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// Converts lengths or strides to Dims. Throws Error if their number exceeds the maximum rank of Dims.
+/// Throws Error if the number of values exceeds the maximum rank of Dims.
 Dims dims_of(const std::vector<int64_t>& values);
 
-/// Array of the library that Python can access (pictura.Array). `owner` keeps its memory alive, even after the Python
-/// object that returned the array is gone.
+/// Library array that Python can access (pictura.Array). `owner` keeps its memory alive.
 struct LentArray {
   Array array;
   std::shared_ptr<const void> owner;
   Stream stream;         // stream of work on the array; null: CUDA's legacy default stream
-  bool is_bool = false;  // whether u8 elements are bools
+  bool is_bool = false;  // u8 elements are bools
   std::string what;      // name in messages
 };
 
-/// Array of a Python caller, accessed in the caller's memory. Holds a reference to the Python object that owns the
-/// memory.
+/// Python caller's array. Keeps the Python object that owns the memory.
 class BorrowedArray {
  public:
   BorrowedArray() = default;
@@ -52,18 +49,15 @@ class BorrowedArray {
   dlpack::DLManagedTensor* older_ = nullptr;
 };
 
-/// Returns access to an array of a Python caller: a LentArray or any object that supports DLPack (NumPy, torch, JAX,
-/// CuPy). If the array is on a device, later work on `stream` waits for pending writes to the array. Throws Error,
-/// whose message names `what`, for other objects, unsupported element types, and devices other than the host and CUDA
-/// devices. The caller must hold the GIL.
+/// Borrows a LentArray or any object that supports DLPack (NumPy, torch, JAX, CuPy). On a device, later work on
+/// `stream` waits for pending writes. Throws Error naming `what` for other objects, unsupported element types, and
+/// devices other than host and CUDA. The caller must hold the GIL.
 BorrowedArray borrow(const py::handle& object, std::string_view what, Stream stream);
 
-/// Variant of borrow() that also accepts NumPy arrays of structs of `size` bytes. The result is then u8 [count, size]
-/// on the host.
+/// Also accepts NumPy arrays of structs of `size` bytes, as u8 [count, size] on the host.
 BorrowedArray borrow_structs(const py::handle& object, std::string_view what, size_t size, Stream stream);
 
-/// Converts a Python value to T. Throws UsageError if that is impossible; the message contains `what`, `expected` and
-/// the value.
+/// Throws UsageError with `what`, `expected` and the value if the conversion fails.
 template <typename T>
 T cast_checked(const py::handle& value, std::string_view what, std::string_view expected) {
   try {
@@ -73,7 +67,6 @@ T cast_checked(const py::handle& value, std::string_view what, std::string_view 
   }
 }
 
-/// Returns the name of an object's class, for messages.
 std::string type_name_of(const py::handle& object);
 
 void bind_arrays(py::module_& module);

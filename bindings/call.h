@@ -1,5 +1,4 @@
-// Rules for calls of the library from Python. The calls run without the GIL. Only one thread at a time may call an
-// object. A child of fork() cannot make calls that need threads or CUDA if its parent has used them.
+// Python's calls of the library, which run without the GIL.
 #pragma once
 
 #include <atomic>
@@ -24,12 +23,11 @@ namespace pictura::python {
 namespace py = pybind11;
 
 /// Throws Error in a child of fork() if this call needs threads or CUDA and the parent has used them. The child has
-/// neither the parent's threads nor its CUDA context, and would wait for them forever.
+/// neither, and would wait forever.
 void check_process(std::string_view what, int num_threads, Device device);
 
-/// Scope without the GIL. If the interpreter is shutting down when the scope ends, Python before 3.14 throws an
-/// exception to end the thread. An exception must not leave a destructor, so the thread instead waits for the end of
-/// the process, as it does in Python 3.14 and later.
+/// Scope without the GIL. At interpreter shutdown, Python before 3.14 throws an exception, which must not leave the
+/// destructor. The thread then waits for the end of the process, as in later Pythons.
 class GilRelease {
  public:
   GilRelease() : state_(PyEval_SaveThread()) {}
@@ -47,20 +45,18 @@ class GilRelease {
   PyThreadState* state_;
 };
 
-/// Makes the methods of a module's classes reject Python objects without a C++ object, which result from __new__
-/// without __init__. Otherwise pybind11 would pass uninitialised memory to the methods. Call this at the end of a
-/// module's definition.
+/// Makes methods reject objects that __new__ created without __init__. Otherwise pybind11 passes uninitialised memory
+/// to them. Call at the end of a module's definition.
 void reject_uninitialized_objects(const py::module_& module);
 
-/// Makes objects of a module's classes use pickle protocol 2 if protocol 0 or 1 is requested. With protocols 0 and 1,
-/// Python would copy the part of an object that belongs to pybind11's base class, which crashes the process. Call this
-/// at the end of a module's definition.
+/// Uses pickle protocol 2 instead of 0 and 1, with which Python crashes on pybind11's base class. Call at the end of a
+/// module's definition.
 void pickle_by_new_protocols(const py::module_& module);
 
-/// Guard that allows only one thread at a time to call an object.
+/// Allows only one thread at a time to call an object.
 class SingleCallGuard {
  public:
-  /// Scope of a call. The constructor throws Error if another thread is in a call.
+  /// The constructor throws Error if another thread is in a call.
   class Pass {
    public:
     Pass(SingleCallGuard* call_guard, std::string_view what) : call_guard_(call_guard) {
@@ -79,13 +75,13 @@ class SingleCallGuard {
   std::atomic<bool> is_taken_{false};
 };
 
-/// Runs calls of one library object, only one at a time.
+/// Runs calls of one library object.
 class Calls {
  public:
-  /// num_threads: number of threads that the object uses; 0: all.
+  /// num_threads: threads that the object uses; 0: all.
   Calls(int num_threads, Device device) : num_threads_(num_threads), device_(device) {}
 
-  /// Runs `work` without the GIL. Throws Error if another thread is in a call of the same object.
+  /// Runs `work` without the GIL. Throws Error if another thread is in a call of the object.
   template <typename Work>
   auto run(std::string_view what, Work&& work) {
     check_process(what, num_threads_, device_);
@@ -94,7 +90,7 @@ class Calls {
     return std::forward<Work>(work)();
   }
 
-  /// Returns the guard, for other objects that call the same library object.
+  /// Shared with other objects that call the same library object.
   const std::shared_ptr<SingleCallGuard>& call_guard() const { return call_guard_; }
 
  private:
@@ -103,9 +99,8 @@ class Calls {
   std::shared_ptr<SingleCallGuard> call_guard_ = std::make_shared<SingleCallGuard>();
 };
 
-/// Runs long work in a separate thread and returns its result. On ^C, the call raises KeyboardInterrupt immediately;
-/// the work continues in the background, and its result is discarded. The work must therefore own all data that it
-/// reads.
+/// Runs long work in a separate thread. On ^C, raises KeyboardInterrupt immediately; the work continues in the
+/// background. The work must therefore own all data that it reads.
 template <typename Work>
 auto run_interruptibly(std::string_view what, int num_threads, Device device, Work work) {
   using Result = decltype(work());
@@ -123,9 +118,8 @@ auto run_interruptibly(std::string_view what, int num_threads, Device device, Wo
   return result.get();
 }
 
-/// Runs long work in a separate thread and returns its result. The work must check interrupted() regularly and return
-/// early if it is true. On ^C, the call waits for this return and then raises KeyboardInterrupt. The work may call
-/// Python functions.
+/// Runs long work in a separate thread. On ^C, waits until the work returns, then raises KeyboardInterrupt. The work
+/// must return early when interrupted() is true. It may call Python functions.
 template <typename Work>
 auto run_interruptible(std::string_view what, int num_threads, Device device, Work work) {
   check_process(what, num_threads, device);

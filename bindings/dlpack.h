@@ -1,5 +1,4 @@
-// The part of DLPack 1.0 that the bindings use. DLPack is a binary interface with which libraries share tensors. The
-// file contains the structs of the versioned and the older form; names follow the standard.
+// Structs of DLPack 1.0 in the versioned and the older form, with the standard's names.
 #pragma once
 
 #include <cstdint>

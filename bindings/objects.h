@@ -1,5 +1,4 @@
-// C++ objects behind Python classes (maps, geometries and scenes), for several files of the bindings. Also the contents
-// of simulators, renderers and controllers, which the extension modules pass to each other.
+// C++ objects behind Python classes, for several files and extension modules.
 #pragma once
 
 #include <functional>
@@ -23,17 +22,16 @@ namespace pictura::python {
 /// Road map (pictura.Map) with its compiled versions.
 class Map {
  public:
-  /// Wraps a map. Messages contain `source`, the name of its file.
+  /// source: name in messages.
   Map(std::shared_ptr<const RoadMap> road, std::string source) : road_(std::move(road)), source_(std::move(source)) {}
   virtual ~Map() = default;
   const std::shared_ptr<const RoadMap>& road() const { return road_; }
   const std::string& source() const { return source_; }
-  /// Returns the map compiled with these options. The first call for each set of options compiles it. The caller must
-  /// hold the GIL.
+  /// Compiles once for each set of options. The caller must hold the GIL.
   std::shared_ptr<const CompiledMap> compiled(const MapOptions& options);
 
  protected:
-  /// Returns a function that compiles the map. The function owns all data that it reads.
+  /// Returns a function that compiles the map and owns all data that it reads.
   virtual std::function<std::shared_ptr<const CompiledMap>()> compilation(const MapOptions& options) const;
 
  private:
@@ -42,10 +40,10 @@ class Map {
   std::vector<std::shared_ptr<const CompiledMap>> compiled_;
 };
 
-/// Recorded scene from a start step on, as a map. The agents of worlds on this map are the scene's tracks.
+/// Recorded scene from a start step on, as a map whose agents are the scene's tracks.
 class RecordedScene final : public Map {
  public:
-  /// Throws UsageError for a step that the scene does not have.
+  /// Throws UsageError for a step that the scene lacks.
   RecordedScene(std::shared_ptr<const Scenario> scenario, std::string source, int32_t start_step,
                 bool recorded_lights = false);
   const std::shared_ptr<const Scenario>& scenario() const { return scenario_; }
@@ -60,41 +58,38 @@ class RecordedScene final : public Map {
   bool recorded_lights_;
 };
 
-/// Geometry of a map for renderers.
 struct Geometry {
   std::shared_ptr<const StaticGeometry> geometry;
 };
 
-/// Moving objects to draw: arrays of a caller, or the current scene of a simulator.
+/// Moving objects: a caller's arrays, or a simulator's current scene.
 struct Scene {
   std::shared_ptr<const void> owner;
   std::function<SceneBatch()> batch;
   Stream stream;
 };
 
-/// C++ contents of a pictura.Simulator.
+/// Contents of a pictura.Simulator.
 struct SimulatorInside {
   std::shared_ptr<Simulator> simulator;
-  /// Runs `work` without the GIL, as one call of the simulator (see Calls::run()).
+  /// Runs `work` as Calls::run() does.
   std::function<void(std::string_view what, const std::function<void()>& work)> run;
-  /// Adds an observer of steps. It is removed when the observer is destroyed.
+  /// Adds an observer until its destruction.
   std::function<void(const std::shared_ptr<StepObserver>&)> watch;
 };
 
-/// C++ contents of a pictura.Renderer.
 struct RendererInside {
   std::shared_ptr<Renderer> renderer;
   std::shared_ptr<SingleCallGuard> call_guard;
 };
 
-/// C++ contents of a pictura.Controller.
 struct ControllerInside {
   std::shared_ptr<Simulator> of;
   std::shared_ptr<Controller> controller;
 };
 
-/// Returns the C++ contents of a Python object. Throws UsageError if it is not a pictura.EXPECTED, where EXPECTED is
-/// the value of `expected`, such as "Simulator". The message begins with `what`.
+/// Returns the contents of a Python object. Throws UsageError, beginning with `what`, if it is not a pictura.EXPECTED,
+/// such as "Simulator".
 template <typename Inside>
 Inside inside_of(const py::handle& object, std::string_view what, std::string_view expected) {
   const py::object inside = py::hasattr(object, "_inside") ? py::object(object.attr("_inside")()) : py::none();
@@ -104,18 +99,16 @@ Inside inside_of(const py::handle& object, std::string_view what, std::string_vi
   return py::cast<Inside>(inside);
 }
 
-/// Throws Error if a device was requested but the CPU was chosen. The message contains `choice`, the reason.
+/// Throws Error with the reason `choice` if a device was wanted but the CPU was chosen.
 void check_device(std::string_view what, Device wanted, Device given, std::string_view choice);
 
-/// Converts a stream handle of Python: an int, or None for CUDA's legacy default stream. Throws UsageError for other
-/// values.
+/// Converts an int, or None for CUDA's legacy default stream. Throws UsageError for other values.
 Stream stream_of(const py::object& handle);
 
-/// Converts facts of a map to a dict.
 py::dict facts_of(const MapFacts& facts);
 
-/// Draws a map from above and returns the image, uint8 [height, width, 3]. For a scenario on this map, also draws its
-/// tracks and, unless `step` is -1, their boxes at that step. The caller must hold the GIL.
+/// Returns a map from above, [height, width, 3]. With a scenario, also draws its tracks and, unless `step` is -1, their
+/// boxes. The caller must hold the GIL.
 py::array_t<uint8_t> draw(const RoadMap& map, int width_px, int height_px, const Scenario* scenario = nullptr,
                           int step = -1);
 

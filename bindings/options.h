@@ -1,5 +1,4 @@
-// Python functions whose arguments are the options of a struct. The C++ function visit_options(options, visitor) lists
-// these options.
+// Python functions whose arguments are the options that visit_options() lists.
 #pragma once
 
 #include <array>
@@ -26,25 +25,25 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// Returns the device with a name such as "cpu", "cuda" or "cuda:1". Throws UsageError for other names.
+/// Throws UsageError for names other than "cpu", "cuda", "cuda:1", ...
 Device device_of(const std::string& name);
 
 using ConditioningRanges = std::array<ConditioningRange, kNumConditioning>;
 
-/// Option of a struct as a parameter of a Python function.
+/// Option as a parameter of a Python function.
 struct Parameter {
   std::string name;
   py::object value;      // current value
-  py::cpp_function set;  // set(value) converts a Python value and writes it to the struct
+  py::cpp_function set;  // set(value) converts a Python value and stores it
 };
 
-/// Visitor for visit_options() that collects the options as parameters. The visited struct must outlive the parameters.
+/// Collects options as parameters. The visited struct must outlive them.
 class ParameterVisitor {
  public:
-  /// `function` is the name of the Python function, for messages.
+  /// function: name in messages.
   explicit ParameterVisitor(std::string function) : function_(std::move(function)) {}
 
-  /// Adds a number. Its range is not checked here, but by the code that uses it.
+  /// The code that uses the number checks its range.
   template <typename T, typename... Range>
   void value(const NamedOption& option, T& value, Range...) {
     add<T>(option, value, [&value](const T& given) { value = given; });
@@ -55,7 +54,7 @@ class ParameterVisitor {
     add<std::string>(option, names[static_cast<int>(value)],
                      [=, &value](const std::string& given) { value = chosen<Enum>(option, given, names); });
   }
-  /// Adds a choice. An empty name means nullopt.
+  /// An empty name means nullopt.
   template <typename Enum>
   void choice(const NamedOption& option, std::optional<Enum>& value, Span<const char* const> names) {
     add<std::string>(option, value ? names[static_cast<int>(*value)] : "", [=, &value](const std::string& given) {
@@ -72,13 +71,13 @@ class ParameterVisitor {
     });
   }
   void device(const NamedOption& option, Device& value);
-  /// Adds names of maps. A range of seeds in a name is expanded to several names.
+  /// Adds map names, with ranges of seeds expanded.
   void maps(const NamedOption& option, std::vector<std::string>& names);
-  /// Adds a dict from names of coefficients to numbers or (low, high). It replaces the ranges of these coefficients.
+  /// Adds a dict from coefficients to numbers or (low, high), which replace their ranges.
   void conditioning(const NamedOption& option, ConditioningRanges& ranges);
-  /// Adds a dict from names to numbers, which is stored as texts "name=value".
+  /// Adds a dict, stored as texts "name=value".
   void numbers_by_name(const NamedOption& option, std::vector<std::string>& texts);
-  /// Adds the name of a controller, or a Python function that chooses actions.
+  /// Adds a controller's name, or a Python function that chooses actions.
   template <typename Options>
   void controller(const NamedOption& option, Options& options) {
     using Given = std::variant<std::string, py::function>;
@@ -92,7 +91,6 @@ class ParameterVisitor {
       }
     });
   }
-  /// Adds policies: names of files, or Python functions.
   template <typename Options>
   void policies(const NamedOption& option, Options& options) {
     using Given = std::vector<std::variant<std::string, py::function>>;
@@ -104,12 +102,12 @@ class ParameterVisitor {
       }
     });
   }
-  /// Adds a Python function, or None.
+  /// Adds a Python function or None.
   template <typename... Arguments>
   void callback(const NamedOption& option, std::function<void(Arguments...)>& value) {
     add<py::object>(option, py::none(), [&value](const py::object& given) {
       if (given.is_none()) return;
-      // The Python object is shared, because options are copied without the GIL.
+      // Shared, because options are copied without the GIL.
       value = [function = std::make_shared<const py::object>(given)](Arguments... arguments) {
         const py::gil_scoped_acquire gil;
         (*function)(arguments...);
@@ -136,7 +134,7 @@ class ParameterVisitor {
   std::vector<Parameter> parameters_;
 };
 
-/// Returns a function's signature as pybind11 writes it: "(steps: int = 3) -> str".
+/// Returns a signature as pybind11 writes it: "(steps: int = 3) -> str".
 std::string signature_of(const py::cpp_function& function);
 
 template <typename Options>
@@ -146,21 +144,19 @@ std::vector<Parameter> parameters_of(const std::string& function, Options& optio
   return visitor.parameters();
 }
 
-/// Python function whose parameters are the options of a struct. Callers pass the options `required` by position or by
-/// name, and all others by name.
+/// Python function whose parameters are a struct's options. Only the options `required` may be positional.
 struct OptionsFunction {
   std::string name;
   std::vector<std::string> required;
 
-  /// Returns the text for Python's help(): a signature in the style of pybind11, such as "(config: str, *, minutes:
-  /// float = 0.0) -> dict", and `doc`. `first` lists the parameters before the options.
+  /// Returns the text of help(): a signature such as "(config: str, *, minutes: float = 0.0) -> dict", and `doc`.
+  /// `first`: parameters before the options.
   template <typename Options>
   std::string help(const std::string& first, const std::string& result, const std::string& doc) const {
     Options defaults;
     return signature(parameters_of(name, defaults), first, result) + "\n\n" + doc;
   }
-  /// Returns the callable for Python: it converts its arguments to Options and calls function(options). It throws
-  /// TypeError for arguments that do not fit.
+  /// Returns a callable with the parameters of Options. Throws TypeError for arguments that do not fit.
   template <typename Options, typename Function>
   auto caller(const Function& function) const {
     return [*this, function](const py::args& by_place, const py::kwargs& by_name) {
@@ -175,7 +171,7 @@ struct OptionsFunction {
   void read(const py::args& by_place, const py::dict& by_name, const std::vector<Parameter>& parameters) const;
 };
 
-/// Defines a function in a module. The function's parameters are the options of Options.
+/// Defines a function with the parameters of Options.
 template <typename Options, typename Function>
 void def_with_options(py::module_* module, const OptionsFunction& arguments, const Function& function,
                       const std::string& doc) {
@@ -186,7 +182,7 @@ void def_with_options(py::module_* module, const OptionsFunction& arguments, con
   module->def(arguments.name.c_str(), arguments.caller<Options>(function), help.c_str());
 }
 
-/// Defines a class's constructor, whose parameters are the options of Options. arguments.name is the name of the class.
+/// Defines a constructor with the parameters of Options. arguments.name: the class's name.
 template <typename Options, typename Class, typename Function>
 void def_init_with_options(Class* its_class, const OptionsFunction& arguments, const Function& make,
                            const std::string& doc) {

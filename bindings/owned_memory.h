@@ -1,4 +1,4 @@
-// Memory of an extension module, on the host or on a device, for arrays that Python can access.
+// Memory of an extension module, on the host or on a device.
 #pragma once
 
 #include <vector>
@@ -14,8 +14,7 @@ namespace pictura::python {
 
 class OwnedMemory {
  public:
-  /// Allocates memory and returns its first byte. Previous contents are lost. In builds without CUDA, throws Error for
-  /// a device; the message begins with `what`.
+  /// Returns the first byte; previous contents are lost. Throws Error for a device in builds without CUDA.
   uint8_t* allocate(size_t num_bytes, Device device, [[maybe_unused]] const char* what) {
     if (device.is_host()) {
       on_host_.resize(num_bytes);

@@ -1,5 +1,4 @@
-// C++ classes behind pictura.Simulator and pictura.Controller. They accept arrays of Python (borrow) and give Python
-// access to their own arrays (lend) without copies.
+// Classes behind pictura.Simulator and pictura.Controller, which exchange arrays without copies.
 #pragma once
 
 #include <algorithm>
@@ -26,12 +25,11 @@
 
 namespace pictura::python {
 
-/// Results of a step as Python arrays, which the next step overwrites.
+/// The next step overwrites these arrays.
 struct StepArraysOfPython {
   py::object reward, terminated, truncated, valid, refusal, reward_terms, distance_m;
 };
 
-/// Snapshot of a simulator's state (see Simulator::snapshot()).
 struct Snapshot {
   std::shared_ptr<Simulator> of;
   std::unique_ptr<StateSnapshot> state;
@@ -39,7 +37,7 @@ struct Snapshot {
 
 class PyController;
 
-/// Simulator with its maps, the arrays that it lends, and the callers' arrays that it keeps alive.
+/// Simulator with its maps and arrays.
 class PySimulator {
  public:
   PySimulator(const std::string& executor, const SimulatorConfig& config, const std::vector<std::shared_ptr<Map>>& maps,
@@ -61,8 +59,8 @@ class PySimulator {
   const std::string& choice() const { return choice_; }
   const std::vector<std::shared_ptr<Map>>& maps() const { return maps_; }
 
-  /// Replaces the worlds. If the capacity suffices, arrays stay at their addresses. Otherwise a new simulator replaces
-  /// the old one, and Python's existing arrays keep the old one's memory alive.
+  /// Within the capacity, arrays keep their addresses. Otherwise a new simulator replaces the old one, whose memory
+  /// lasts as long as Python's arrays.
   void set_worlds(const std::vector<std::shared_ptr<Map>>& maps, std::vector<WorldSpec> worlds, uint64_t seed) {
     CompiledMaps next = compiled(maps);
     const SimulatorCapacity needs = capacity_checked(next, worlds);
@@ -245,10 +243,9 @@ class PySimulator {
     return pixels;
   }
 
-  /// Takes steps with the commands of a controller.
   void run(PyController& controller, int64_t steps);
 
-  /// Takes steps in calls of about 50 ms. Between these calls, ^C is handled and other threads may call the simulator.
+  /// Takes steps in calls of about 50 ms. Between calls, ^C is handled and other threads may call the simulator.
   template <typename Work>
   void run_steps(int64_t steps, const Work& step) {
     using Clock = std::chrono::steady_clock;
@@ -264,12 +261,11 @@ class PySimulator {
   }
 
  private:
-  /// Returns the shape of an observation array. Arrays with one row get no dimension for rows.
+  /// Arrays with one row get no dimension for rows.
   static Dims shape_of(int64_t count, int64_t rows, int64_t features) {
     return rows == 1 ? Dims{count, features} : Dims{count, rows, features};
   }
 
-  /// Memory for the answers to observe(), on the host or a device.
   class AnswerMemory {
    public:
     AnswerMemory(int64_t count, const SimulatorConfig& config, Device device) {
@@ -314,8 +310,7 @@ class PySimulator {
     return {reinterpret_cast<const T*>(bytes.data()), static_cast<size_t>(count)};
   }
 
-  /// Returns access to the caller's arrays. The dict must contain each array that this simulator observes, and no
-  /// others.
+  /// The dict must contain exactly the arrays that this simulator observes.
   ObservationView view_of(const py::dict& arrays, int64_t count, std::vector<BorrowedArray>* borrowed) {
     ObservationView view;
     size_t num_known = 0;
@@ -353,7 +348,7 @@ class PySimulator {
     for (const int32_t action : indices) commands.push_back({.action = action});
     return watched_step(std::move(commands));
   }
-  /// Takes a step with observers: waits until they are ready (^C ends this wait), then calls step_observed().
+  /// Waits until observers are ready (^C ends this wait), then calls step_observed().
   StepResult watched_step(std::vector<Command> commands) {
     const std::vector<std::shared_ptr<StepObserver>> watching = watchers();
     for (const auto& watcher : watching) {
@@ -398,8 +393,8 @@ class PySimulator {
     result_ = {};
     of_result_ = nullptr;
   }
-  /// Keeps the arrays of the last call alive, because work on a device may still read them. Releasing the previous
-  /// arrays may call Python code, which may call this object, so it happens last.
+  /// Keeps the arrays of the last call alive, because a device may still read them. The release of previous arrays
+  /// comes last, because it may call Python code that calls this object.
   void keep(std::vector<BorrowedArray> arrays) { kept_.swap(arrays); }
   void keep(BorrowedArray array) {
     std::vector<BorrowedArray> arrays;
@@ -458,7 +453,7 @@ class PySimulator {
   std::optional<py::dict> observations_, state_;
   py::object result_;
   const float* of_result_ = nullptr;
-  std::vector<BorrowedArray> kept_;  // arrays passed to the last call
+  std::vector<BorrowedArray> kept_;  // arrays of the last call
   std::vector<std::weak_ptr<StepObserver>> watchers_;
   std::vector<uint8_t> all_on_host_;
 #ifdef PICTURA_HAS_CUDA
@@ -468,7 +463,7 @@ class PySimulator {
   std::unique_ptr<WorldPainter> painter_;
 };
 
-/// Controller with its simulator and the memory for its commands, on the simulator's device.
+/// Controller with its commands on the simulator's device.
 class PyController {
  public:
   explicit PyController(ControllerInside inside)
@@ -491,7 +486,7 @@ class PyController {
 
   std::string name() const { return std::string(inside_.controller->name()); }
   const ControllerInside& inside() const { return inside_; }
-  /// Computes the commands. Must be called without the GIL.
+  /// Must be called without the GIL.
   void act(const PySimulator& simulator) {
     const bool has_same_worlds = std::ranges::equal(of().maps(), maps_) && std::ranges::equal(of().worlds(), worlds_);
     PICTURA_CHECK(simulator.shared() == inside_.of && has_same_worlds,
@@ -499,8 +494,7 @@ class PyController {
     inside_.controller->act(of().arrays(), {}, commands_->span, simulator.stream());
   }
   Span<const Command> commands() const { return commands_->span; }
-  /// Returns the commands: on the host a NumPy array of COMMAND_DTYPE, on a device an array u8 [slots,
-  /// sizeof(Command)].
+  /// Returns a NumPy array of COMMAND_DTYPE on the host, u8 [slots, sizeof(Command)] on a device.
   py::object lent_commands(Stream stream) const {
     const auto count = static_cast<int64_t>(commands_->span.size());
     auto* const bytes = reinterpret_cast<uint8_t*>(commands_->span.data());
@@ -528,10 +522,8 @@ class PyController {
   std::shared_ptr<Commands> commands_;
 };
 
-/// Adds the methods of pictura.Controller to the class.
 void define_controller(py::class_<PyController>* controller);
 
-/// Adds constants to the module: names and layouts of arrays, fields, events and structs.
 void bind_names(py::module_& module);
 
 }  // namespace pictura::python

@@ -1,4 +1,4 @@
-// Conversion of scenes to and from dicts of NumPy arrays, for pictura.Scenario.from_arrays() and to_arrays().
+// Scenes as dicts of NumPy arrays, for pictura.Scenario.from_arrays() and to_arrays().
 #pragma once
 
 #include <optional>
@@ -12,17 +12,15 @@ namespace pictura::python {
 
 namespace py = pybind11;
 
-/// Arguments of from_arrays(). Optional dicts may be missing.
 struct SceneArrays {
   py::dict tracks, lanes;
   std::optional<py::dict> lines, edges, crosswalks, stop_signs, lights;
 };
 
-/// Converts arrays to a scene: its tracks, map and lights. Throws UsageError for an invalid array; the message contains
-/// the array's name, the element if there is one, and the expected and actual values.
+/// Throws UsageError naming the array, the element if any, and the expected and actual values.
 LoggedScene scene_from_arrays(const SceneArrays& arrays);
 
-/// Converts a scene to dicts. The keys of the result are the names of the arguments of from_arrays().
+/// The keys are the arguments of from_arrays().
 py::dict to_arrays(const LoggedScene& scene);
 
 /// Adds LINE_TYPES and LIGHT_STATES to the module.
