@@ -1,5 +1,5 @@
-// Subcommands of `pictura`, one file each. Each function registers its command with CLI11. The command's callback does
-// the work and throws Error, UsageError or Interrupted, which run_command() converts to one line and an exit status.
+// Subcommands of `pictura`, one file each. Each function registers its command with CLI11. The command throws Error,
+// UsageError or Interrupted, which run_command() converts.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -1,4 +1,4 @@
-// Draws the picture of `pictura probe corner`, which tests policies at blind corners.
+// Picture of `pictura probe corner`.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace pictura {
 
-/// Draws the example pair of states (example_of()) from above, once with walls and once without, in the colours of the
-/// probe's chart. Throws Error, which names the path, if the picture cannot be written.
+/// Draws example_of() from above, with and without walls, in the colours of the probe's chart. Throws Error naming the
+/// path.
 void draw_corner_example(const CornerResults& results, const std::string& path);
 
 }  // namespace pictura

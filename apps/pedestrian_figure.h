@@ -1,4 +1,4 @@
-// Draws the pictures of `pictura probe pedestrian`, which tests policies with pedestrians behind vehicles.
+// Pictures of `pictura probe pedestrian`.
 #pragma once
 
 #include <functional>
@@ -9,10 +9,9 @@
 
 namespace pictura {
 
-/// Writes a picture (path_000.png, ...) of each path into a folder. It shows the path from above, coloured by the
-/// pedestrian's visibility, and the ego's camera images at five points. Calls `on_path` with the number of completed
-/// paths. Returns the pages for pictura.plot, which draws a chart of each path below its picture. Throws Error, which
-/// names the file, if a picture cannot be written.
+/// Writes path_000.png, ...: a path from above, coloured by the pedestrian's visibility, and the ego's camera images at
+/// five points. Calls `on_path` with the number of completed paths. Returns the pages for pictura.plot, which draws a
+/// chart below each picture. Throws Error naming the file.
 Json draw_pedestrian_paths(const PedestrianResults& results, FilledFolder* folder,
                            const std::function<void(size_t)>& on_path);
 

@@ -5,7 +5,7 @@
 
 namespace pictura {
 
-/// Prints the table on stdout, and warnings about omitted scenes and rollouts on stderr.
+/// Prints on stdout, and warns on stderr about omitted scenes and rollouts.
 void print_realism(const RealismReport& report);
 
 }  // namespace pictura

@@ -7,9 +7,8 @@
 
 namespace pictura {
 
-/// Evaluates the driver of `options` in all conditions of the protocol, and prints a table, or one JSON object if
-/// `json`. Throws UsageError for command options that the protocol fixes. After an interrupt, prints the completed
-/// conditions and throws Interrupted.
+/// Prints a table, or one JSON object if `json`. Throws UsageError for command options that the protocol fixes. After
+/// an interrupt, prints the completed conditions and throws Interrupted.
 void run_robust_evaluation(const CLI::App& command, const EvaluateOptions& options, bool json);
 
 }  // namespace pictura
