@@ -1,5 +1,4 @@
-// An agent that a controller drives. The class predicts the agent's motion after actions with the rules of its world,
-// and tests whether a motion leaves the road.
+// Prediction of an agent's motion.
 #pragma once
 
 #include "pictura/simulator/rules/step.h"
@@ -13,20 +12,19 @@ class DrivenAgent {
   DrivenAgent(const WorldView& world, int agent);
 
   Motion now() const { return motion_of(world_.agents, slot_); }
-  /// Returns the motion one step after `from`.
   Motion after(const Motion& from, int32_t action) const;
-  /// Returns the best action without lateral jerk for reaching a speed. For another lateral jerk, add k - kStraight,
-  /// where k in {0, 1, 2} is the index of the jerk.
+  /// Returns the best action without lateral jerk for reaching a speed. For lateral jerk k in {0, 1, 2}, add k -
+  /// kStraight.
   int32_t speed_action(const Motion& from, float wanted_mps) const;
   static constexpr int32_t kStraight = 1;
 
-  /// Returns the agent's box at a pose, enlarged by a margin on every side.
+  /// Returns the box at a pose, enlarged by a margin on every side.
   AgentBox box(Vec3 axle_m, float heading_rad, float margin_m) const;
-  /// Whether the agent's box at this motion and height, enlarged by a margin on every side, is partly off the road.
+  /// Whether the enlarged box at this motion is partly off the road.
   bool leaves_road(const Motion& at, float z_m, float margin_m) const;
-  /// Whether the front bumper crosses an exit at height z_m in a step, so that the agent leaves the map.
+  /// Whether the front bumper crosses an exit of the map.
   bool crosses_exit(const Motion& before, const Motion& after, float z_m) const;
-  /// Returns the distance from the rear axle to the front bumper.
+  /// Distance from the rear axle.
   float to_bumper_m() const;
   float wheelbase_m() const { return parameters_.wheelbase_m; }
   float dt_s() const { return world_.options.dt_s; }

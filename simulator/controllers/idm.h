@@ -1,5 +1,4 @@
-// Intelligent driver model (IDM): agents follow recorded paths or lanes, and keep a distance from obstacles on their
-// path. Runs only on the host.
+// Intelligent driver model (IDM) along recorded paths or lanes. Runs only on the host.
 #pragma once
 
 #include <cmath>
@@ -14,7 +13,7 @@
 namespace pictura {
 
 /// Parameters of the IDM (Treiber, Hennecke and Helbing, Congested traffic states in empirical observations and
-/// microscopic simulations, 2000). The values are those of Waymax's waypoint-following agents.
+/// microscopic simulations, 2000). The values are Waymax's.
 struct IdmParameters {
   float wanted_mps = 30;
   float min_gap_m = 2;
@@ -24,23 +23,21 @@ struct IdmParameters {
   float look_ahead_m = 10;
 };
 
-/// Returns the acceleration at speed_mps behind a road user that is gap_m ahead and has the speed front_mps. An
-/// infinite gap means that there is no road user in front.
+/// Acceleration behind a road user gap_m ahead that drives at front_mps. An infinite gap means a free road.
 float idm_acceleration(const IdmParameters& parameters, float speed_mps, float gap_m, float front_mps);
 
-/// Path of an agent: positions of its reference point with headings. Each position is at least kMinPiece_m from the
-/// previous position.
+/// Path of an agent's reference point.
 struct FollowedPath {
   static constexpr float kMinPiece_m = 0.5f;
   std::vector<Vec3> points_m;
   std::vector<float> heading_rad;
-  std::vector<float> s_m;  // arc length along the path
+  std::vector<float> s_m;  // arc length
   bool ends = true;        // false: lanes continue beyond the path
 
-  /// Adds a position, unless it is less than kMinPiece_m from the last position.
+  /// Ignores a position that is less than kMinPiece_m from the last.
   void add(Vec3 point_m, float its_heading_rad);
   float length_m() const { return s_m.back(); }
-  /// Returns the arc length of the path's point nearest to p. Searches the path from about `from_s_m` on.
+  /// Arc length of the point nearest to p. The search starts at about from_s_m.
   float nearest_m(Vec2 p, float from_s_m) const;
   struct Pose {
     Vec3 position_m;
@@ -49,24 +46,21 @@ struct FollowedPath {
   Pose at(float s_m) const;
 };
 
-/// Returns a path from a pose to the centre line of the lane and along the following lanes, for 200 m or to the end of
-/// the lanes. At a fork, the path takes the straightest successor on which routes may continue
-/// (MapLane::num_successors). If there is none, it takes the straightest of all successors. At a lane without
-/// successors, the path changes to the nearest lane beside it that has successors. If there is no room for the change,
-/// the path ends where the front bumper, front_m ahead of the reference point, is still before the lane's end. If
-/// `lane` is -1, the path consists of the pose alone.
+/// Returns a path from a pose to the lane's centre line and along the following lanes, for 200 m or to their end. At a
+/// fork, the path takes the straightest successor on which routes may continue, else the straightest of all. At a lane
+/// without successors, it changes to the nearest lane beside it with successors. Without room for the change, it ends
+/// with the front bumper, front_m ahead of the reference point, before the lane's end. If `lane` is -1, the path is the
+/// pose alone.
 FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m, float heading_rad, float front_m);
 
 enum class IdmPaths {
   logged,  // along recorded paths; on maps without a record, along lanes
-  lanes,   // along lanes for all vehicles and cyclists
+  lanes,   // all vehicles and cyclists along lanes
 };
 
-/// Moves every commanded agent along its path with kinematic_state commands. The road user in front is the first box
-/// that the agent's box would touch on the next look_ahead_m of the path. An agent continues from its current position
-/// and speed, and stops at the end of its path. Along lanes, the desired speed is at most the lane's speed limit. Stop
-/// lines are standing obstacles if their light is red, or if it is yellow and the agent can still brake. Pedestrians
-/// without a record stand still.
+/// Moves every commanded agent along its path with kinematic_state commands. An agent keeps its distance from the first
+/// box that its own box would touch within look_ahead_m. It stops at the end of its path, at red lights, and at yellow
+/// lights if it can still brake. Along lanes, it respects the speed limit. Pedestrians without a record stand still.
 class IdmController final : public Controller {
  public:
   explicit IdmController(const Simulator& simulator, IdmPaths paths = IdmPaths::logged,
@@ -88,12 +82,12 @@ class IdmController final : public Controller {
   IdmPaths wanted_paths_;
   IdmParameters parameters_;
   float dt_s_;
-  std::vector<std::shared_ptr<const CompiledMap>> maps_;  // keeps the arrays of views_ alive
+  std::vector<std::shared_ptr<const CompiledMap>> maps_;  // owns the arrays of views_
   std::vector<MapView> views_;                            // [worlds]
   std::vector<FollowedPath> paths_;                       // [slots]
-  std::vector<uint8_t> on_lanes_;                         // [slots] whether the agent's path is along lanes
-  std::vector<float> progress_m_;                         // [slots] progress along the path at the last act()
-  std::vector<int32_t> life_;                             // [slots] life of the agent at the last act()
+  std::vector<uint8_t> on_lanes_;                         // [slots]
+  std::vector<float> progress_m_;                         // [slots] arc length at the last act()
+  std::vector<int32_t> life_;                             // [slots] life at the last act()
 };
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Manual driving: the mapping from pressed keys to actions.
+// Manual driving with a keyboard.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// Pressed keys. If no key is pressed, the agent keeps its speed and straightens its steering.
+/// Pressed keys. Without a pressed key, the agent keeps its speed and straightens its steering.
 struct DrivingKeys {
   bool forward = false;   // accelerates
   bool backward = false;  // brakes; at rest, starts to reverse
@@ -16,8 +16,8 @@ struct DrivingKeys {
   bool operator==(const DrivingKeys&) const = default;
 };
 
-/// Returns the action that, after a step of dt_s, brings the accelerations of the agent in `slot` nearest to those that
-/// the keys request.
+/// Returns the action that brings the agent's accelerations, after a step of dt_s, nearest to those that the keys
+/// request.
 int32_t action_of_keys(const DrivingKeys& keys, const AgentStateView& state, int slot, float dt_s);
 
 }  // namespace pictura

@@ -1,8 +1,6 @@
-// The lane keeper: a controller for vehicles and cyclists in traffic. An agent drives through its waypoints, stops at
-// red lights and behind other road users, and gives way when it changes lanes. It keeps enough distance to stop even if
-// the road user in front halts within one step. It follows the centre lines of lanes by pure pursuit. Long vehicles cut
-// corners: if the agent would leave the road, it searches for a plan that stays on the road; if it finds none, it
-// stops. Runs only on the host.
+// The lane keeper: a controller for vehicles and cyclists. An agent drives through its waypoints by pure pursuit of
+// lanes. It stops at red lights and behind other road users, and gives way when it changes lanes. Where it would leave
+// the road, it searches for a plan that stays on the road; without such a plan, it stops. Runs only on the host.
 #pragma once
 
 #include <array>
@@ -21,30 +19,27 @@ namespace pictura {
 
 struct SimulatorSetup;
 
-/// Drives one vehicle or cyclist of a world through one life.
+/// Drives one vehicle or cyclist through one life.
 class LaneKeepingAgent {
  public:
-  /// The object must be constructed before the first step of the agent's life. `graph` is the lane graph of the world's
-  /// map. The graph and the arrays of `world` must outlive this object; act() reads the current state of agents and
-  /// lights from them. `search_nodes` is the budget of search nodes that remains from the slot's previous life.
+  /// Must be constructed before the first step of the agent's life. `graph` is the lane graph of the world's map. The
+  /// graph and the arrays of `world` must outlive this object. `search_nodes` is the search budget left by the slot's
+  /// previous life.
   LaneKeepingAgent(const WorldView& world, int agent, const LaneGraph& graph, size_t search_nodes = kMaxSearchNodes);
 
-  /// Returns the action for the current state of agents and lights.
   int32_t act();
   int32_t life() const { return life_; }
-  /// Remaining budget of nodes for searches of plans.
+  /// Remaining search budget.
   size_t search_nodes() const { return search_nodes_; }
-  /// Number of steps in which the agent waited at a red light.
+  /// Steps of waiting at red lights.
   int stops() const { return stops_; }
-  /// Number of steps in which the rear axle was more than kOffPath_m from the path.
+  /// Steps with the rear axle more than kOffPath_m from the path.
   int steps_off_path() const { return steps_off_path_; }
   static constexpr float kOffPath_m = 1;
 
  private:
-  // Computing a search node takes 1 to 4 us. On maps whose roads end, an agent's search takes at most 10 ms per step; a
-  // few vehicles then find no plan for the tightest curves (docs/research/public_maps.md). On other maps, a plan may
-  // need 130,000 nodes. There, the searches of an agent took at most 0.9 s in a single step, and at most 1 ms per step
-  // averaged over a long run (measured).
+  // A search node takes 1 to 4 us. On open maps, whose roads end, a search takes at most 10 ms per step. On other maps,
+  // a plan may need 130,000 nodes.
   static constexpr size_t kMaxSearchNodes = 300'000, kMaxSearchNodesOfOpen = 2'000, kSearchNodesPerStep = 500,
                           kMinSearchNodes = 20'000;
 
@@ -77,42 +72,42 @@ class LaneKeepingAgent {
   const int32_t life_;
   const DrivenAgent agent_;
   std::array<RoutePoint, kNumWaypoints> waypoints_;
-  int32_t chain_ = -1;  // index of the goal chain of waypoints_
+  int32_t chain_ = -1;
   LanePath path_;
-  size_t place_ = 0;                           // index of the nearest point of the path
-  std::array<size_t, kNumWaypoints> goals_{};  // indices of the path's points at the waypoints
+  size_t place_ = 0;                           // nearest point of the path
+  std::array<size_t, kNumWaypoints> goals_{};  // points at waypoints_
   DrivingPlan plan_;
-  size_t next_planned_ = 0;  // index of the plan's next action
+  size_t next_planned_ = 0;
   const size_t max_search_nodes_;
   size_t search_nodes_;
-  size_t min_search_nodes_ = 0;  // minimum budget for beginning the next search
-  bool halts_ = false;           // the agent halts on the road until it finds a plan
+  size_t min_search_nodes_ = 0;  // minimum budget for the next search
+  bool halts_ = false;           // until a plan is found
   int stops_ = 0, steps_off_path_ = 0;
 };
 
-/// Drives all vehicles and cyclists of a simulator; pedestrians stand still.
+/// Drives all vehicles and cyclists; pedestrians stand still.
 class LaneKeepingController final : public Controller {
  public:
-  /// Copies the configuration, maps and worlds of a simulator, which may run on any device. The input of act() must be
-  /// in host memory.
+  /// Copies the configuration, maps and worlds of a simulator on any device.
   explicit LaneKeepingController(const Simulator& simulator);
   ~LaneKeepingController() override;
 
   std::string_view name() const override { return "lane"; }
-  /// Also throws Error if act() was not called before the first step of a world's current episode.
+  /// Needs input in host memory. Also throws Error if act() was not called before the first step of a world's current
+  /// episode.
   void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out,
            Stream stream = {}) override;
-  /// Returns null for pedestrians, for absent agents, and before the first act().
+  /// Null for pedestrians, for absent agents, and before the first act().
   const LaneKeepingAgent* agent(size_t slot) const { return agents_[slot].get(); }
 
  private:
   void begin_episode(const SimulatorArrays& input, size_t world);
   void begin_lives(size_t world);
 
-  std::unique_ptr<SimulatorSetup> setup_;                  // copy of the simulator's maps and options
+  std::unique_ptr<SimulatorSetup> setup_;
   std::vector<std::unique_ptr<LaneGraph>> graphs_;         // [maps]
   std::vector<int32_t> episode_;                           // [worlds] episode that agents_ drive, or -1
-  std::vector<std::optional<WorldView>> views_;            // [worlds] views of the worlds in that episode
+  std::vector<std::optional<WorldView>> views_;            // [worlds]
   std::vector<std::unique_ptr<LaneKeepingAgent>> agents_;  // [slots]
 };
 

@@ -1,5 +1,4 @@
-// Path of an agent of the lane keeper. The path follows centre lines of lanes through the agent's waypoints, with
-// gradual lane changes. It contains the speeds at which the agent can drive its curves.
+// Path of the lane keeper, with gradual lane changes and maximum speeds.
 #pragma once
 
 #include <cstddef>
@@ -11,14 +10,14 @@
 
 namespace pictura {
 
-/// A lane change. The lateral offset from the new lane decreases smoothly to 0.
+/// Lane change, in which the lateral offset from the new lane decreases smoothly to 0.
 struct LaneChange {
-  float aside_m = 0;   // initial offset to the left of the new lane
-  float length_m = 1;  // along the lane
-  float done_m = 1;    // completed part of length_m
+  float aside_m = 0;  // initial offset to the left of the new lane
+  float length_m = 1;
+  float done_m = 1;  // completed part of length_m
 
   float aside_now_m() const;
-  float slope() const;  // change of the offset per metre along the lane
+  float slope() const;  // change of the offset per metre
 };
 
 struct PathPoint {
@@ -29,8 +28,7 @@ struct PathPoint {
   float speed_mps = 0;  // maximum speed
 };
 
-/// Returns the index of a point near place_m: the search starts at `from` and continues as long as the next point is
-/// nearer.
+/// Returns the index of the first local minimum, from `from` on, of the distance to place_m.
 size_t nearest_point(const std::vector<PathPoint>& path, size_t from, Vec2 place_m);
 
 /// Path with a point every kSpacing_m. `graph` must be the lane graph of `map`. The graph and the arrays of `map` must
@@ -45,16 +43,16 @@ class LanePath {
 
   /// Removes the points after point `last`.
   void cut(size_t last);
-  /// Extends the path to a point. Returns false if no route leads there, or if there is no room for the lane changes
-  /// even with detours. The path may then be extended along a wrong route.
+  /// Extends the path to a point. Returns false, and may leave a wrong extension, if there is no route or no room for
+  /// lane changes even with detours.
   bool go_to(RoutePoint to);
   /// Extends the path by about distance_m, or to the end of the lanes. It takes the straightest lane at forks, and
-  /// changes from a lane that ends to a lane beside it that continues.
+  /// changes from a lane that ends to one beside it that continues.
   void go_on(float distance_m);
-  /// Whether there is a fork within distance_m after the path's end. The end of a road is not a fork.
+  /// Whether there is a fork within distance_m after the path's end.
   bool forks_within(float distance_m) const;
-  /// Sets the maximum speed of every point from the curvature there and from the braking distance to slower points
-  /// ahead. The maximum at point `slow` is at most slow_mps.
+  /// Sets maximum speeds from the curvature and from the braking distance to slower points. The maximum at point `slow`
+  /// is at most slow_mps.
   void limit_speeds(size_t slow, float slow_mps);
 
  private:
