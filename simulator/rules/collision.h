@@ -1,5 +1,4 @@
-// Contact of oriented boxes with each other and with barriers. Contact with other boxes is tested over the whole step,
-// so that fast agents cannot pass through each other. Fault is assigned as in the paper (appendix, metric definitions).
+// Contact of boxes with each other and with barriers, and fault in collisions (paper, appendix, metric definitions).
 #pragma once
 
 #include "pictura/common/math.h"
@@ -9,7 +8,7 @@
 
 namespace pictura {
 
-/// A rectangle on the ground.
+/// Rectangle on the ground.
 struct OrientedBox {
   Vec2 center_m;
   Vec2 forward;  // unit vector
@@ -20,19 +19,18 @@ PICTURA_HD inline OrientedBox footprint(const AgentBox& box) {
   return {box.center_m.xy(), {box.cos_heading, box.sin_heading}, 0.5f * box.length_m, 0.5f * box.width_m};
 }
 
-/// Middle of the box's front bumper.
 PICTURA_HD inline Vec2 front_bumper(const AgentBox& box) {
   return box.center_m.xy() + Vec2{box.cos_heading, box.sin_heading} * (0.5f * box.length_m);
 }
 
 PICTURA_HD inline float radius(const AgentBox& box) { return 0.5f * sqrtf(square(box.length_m) + square(box.width_m)); }
 
-/// Half of the extent of `box` along the unit vector `axis`.
+/// Half of the box's extent along the unit vector `axis`.
 PICTURA_HD inline float half_extent(const OrientedBox& box, Vec2 axis) {
   return box.half_length_m * fabsf(dot(box.forward, axis)) + box.half_width_m * fabsf(cross(box.forward, axis));
 }
 
-/// Separating-axis test of two rectangles; touching counts as overlapping.
+/// Separating-axis test; touching counts as overlapping.
 PICTURA_HD inline bool overlap(const OrientedBox& a, const OrientedBox& b) {
   const Vec2 between = b.center_m - a.center_m;
   const Vec2 axes[4] = {a.forward, left_normal(a.forward), b.forward, left_normal(b.forward)};
@@ -46,7 +44,7 @@ PICTURA_HD inline bool same_level(const AgentBox& a, const AgentBox& b) {
   return a.center_m.z < b.center_m.z + b.height_m && b.center_m.z < a.center_m.z + a.height_m;
 }
 
-/// Interpolates a box between `from` (fraction 0) and `to` (fraction 1). Headings differ little within a step.
+/// Interpolates between `from` (fraction 0) and `to` (fraction 1). Headings differ little within a step.
 PICTURA_HD inline OrientedBox between(const AgentBox& from, const AgentBox& to, float fraction) {
   OrientedBox box = footprint(to);
   const Vec2 start{from.cos_heading, from.sin_heading};
@@ -57,8 +55,8 @@ PICTURA_HD inline OrientedBox between(const AgentBox& from, const AgentBox& to, 
   return box;
 }
 
-/// Whether two boxes touch while they move during a step, or at its end. The motion is sampled so finely that between
-/// two samples the boxes approach each other by less than the width of the narrower box.
+/// Whether two boxes touch during a step or at its end. Between two samples of the motion, the boxes approach each
+/// other by less than the narrower box's width.
 PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, const AgentBox& b_from,
                                const AgentBox& b_to) {
   const Vec2 a_path = (a_to.center_m - a_from.center_m).xy();
@@ -76,11 +74,9 @@ PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, con
   return false;
 }
 
-/// Whether an agent is at fault for a collision (paper). An agent is not at fault if it is almost at rest or is struck
-/// from behind. A reversing agent is never struck from behind. An agent that drives forward is struck from behind if,
-/// before the step, the nearer end of the other box was behind the plane of the agent's rear bumper. The nearer end is
-/// the middle of the other box's front or rear, whichever is farther forward as seen from the agent. own_speed_mps is
-/// the agent's speed in the step.
+/// Whether an agent is at fault for a collision (paper). An agent that is almost at rest or struck from behind is not
+/// at fault. A reversing agent is never struck from behind. Another agent is struck from behind if the other box's
+/// nearer end was behind its rear bumper before the step. own_speed_mps is the speed in the step.
 PICTURA_HD inline bool at_fault(const AgentBox& own_before, float own_speed_mps, const AgentBox& other_before) {
   constexpr float kStopped_mps = 0.2f;
   if (fabsf(own_speed_mps) < kStopped_mps) return false;
@@ -93,7 +89,7 @@ PICTURA_HD inline bool at_fault(const AgentBox& own_before, float own_speed_mps,
   return nearer_end > rear;
 }
 
-/// Whether the segment a-b touches the box. Clips the segment to the box's extent along each axis of the box.
+/// Whether the segment a-b touches the box.
 PICTURA_HD inline bool touches(const OrientedBox& box, Vec2 a_m, Vec2 b_m) {
   const Vec2 a = a_m - box.center_m;
   const Vec2 step = b_m - a_m;
@@ -116,8 +112,8 @@ PICTURA_HD inline bool touches(const OrientedBox& box, Vec2 a_m, Vec2 b_m) {
   return true;
 }
 
-/// Whether the box touches any barrier on its level. A test at the end of each step suffices: a box is longer than its
-/// motion in a step, so that its positions before and after the step overlap.
+/// Whether the box touches a barrier on its level. A test at the end of each step suffices, because a box is longer
+/// than its motion in a step.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool touches_any(const OrientedBox& box, float z_m, Span<const Barrier> barriers, const GridView& cells,
                             const ThreadGroup& group = {}) {

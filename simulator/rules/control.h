@@ -1,4 +1,4 @@
-// Controllers that compute a command from a slot's index or a table. All executors share this code.
+// Controllers that compute a command from a slot's index or a table, for all executors.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -8,7 +8,6 @@
 
 namespace pictura {
 
-/// Draws an action uniformly from all actions.
 PICTURA_HD inline int32_t random_action(uint64_t seed, uint32_t global_world, int agent, uint32_t step) {
   RandomStream random({.seed = seed,
                        .world = global_world,
@@ -18,13 +17,13 @@ PICTURA_HD inline int32_t random_action(uint64_t seed, uint32_t global_world, in
   return random.below(kNumActions);
 }
 
-/// Number of steps of a world since the construction of its simulator, including the steps that began episodes.
+/// Number of steps of a world, including steps that began episodes.
 PICTURA_HD inline uint32_t steps_of(const SimulatorTotals& world_totals, int32_t num_agents) {
   return static_cast<uint32_t>(world_totals.slot_steps / num_agents);
 }
 
-/// Random actions. Each depends only on seed, world, agent and the world's number of steps. Because there is no further
-/// state, a restored simulator continues with the same actions.
+/// Random actions, which depend only on seed, world, agent and the world's number of steps. A restored simulator
+/// continues with the same actions.
 struct RandomCommands {
   uint64_t seed;
   SlotTable slots;
@@ -40,12 +39,10 @@ struct RandomCommands {
   }
 };
 
-/// Commands without jerk.
 struct IdleCommands {
   PICTURA_HD Command operator()(size_t) const { return {}; }
 };
 
-/// Commands to follow the record.
 struct RecordedCommands {
   PICTURA_HD Command operator()(size_t) const {
     Command command;
@@ -54,13 +51,13 @@ struct RecordedCommands {
   }
 };
 
-/// Location of a world's actions in TabledCommands::actions: an array [agents, num_steps] that starts at index `first`.
+/// A world's actions [agents, num_steps], from index `first` of TabledCommands::actions on.
 struct ActionTable {
   int64_t first = 0;
   int32_t num_steps = 0;
 };
 
-/// Actions from a table for the first num_steps steps of each episode; after these, actions without jerk.
+/// Actions for the first num_steps steps of each episode, then actions without jerk.
 struct TabledCommands {
   SlotTable slots;
   Span<const int32_t> episode_step;  // [worlds]

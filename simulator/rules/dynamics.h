@@ -1,6 +1,5 @@
-// Jerk-controlled kinematic bicycle: actions are longitudinal and lateral jerks, and the rear axle moves along a
-// circular arc. These are Gigaflow's dynamics; the formulae follow the public reference implementation of the paper's
-// simulator.
+// Gigaflow's dynamics: a jerk-controlled kinematic bicycle whose rear axle moves along a circular arc. The formulae
+// follow the public reference implementation of the paper's simulator.
 #pragma once
 
 #include "pictura/common/math.h"
@@ -15,28 +14,28 @@ struct Motion {
   float speed_mps = 0;
   float accel_long_mps2 = 0, accel_lat_mps2 = 0;
   float steer_rad = 0;
-  float jerk_long_mps3 = 0, jerk_lat_mps3 = 0;  // changes of the accelerations in the step, divided by its duration
+  float jerk_long_mps3 = 0, jerk_lat_mps3 = 0;  // change of acceleration per second
 };
 
 struct Controls {
   float jerk_long_mps3 = 0, jerk_lat_mps3 = 0;  // lateral: positive to the left
 };
 
-/// Returns the jerks of an action, whose index is long * 3 + lat (paper: 4 x 3 bins).
+/// Returns the jerks of an action (paper: 4 x 3 bins).
 PICTURA_HD constexpr Controls controls_of_action(int action) {
   const float jerk_long[kNumLongActions] = {-15.0f, -4.0f, 0.0f, 4.0f};
   const float jerk_lat[kNumLatActions] = {-4.0f, 0.0f, 4.0f};
   return {jerk_long[action / kNumLatActions], jerk_lat[action % kNumLatActions]};
 }
 
-/// Parameters of an agent's dynamics: multipliers from its conditioning, its wheelbase, and options.
+/// Multipliers from the agent's conditioning, wheelbase, and options.
 struct DynamicsParameters {
   float throttle = 1, steer = 1, acceleration = 1;
   float wheelbase_m = 2.7f;
   DynamicsRules rules{};
 };
 
-/// Returns the contribution of a step to the driven distance. speed_mps is the speed after the step.
+/// speed_mps is the speed after the step.
 PICTURA_HD inline float driven_m(float speed_mps, float dt_s) { return fabsf(speed_mps) * dt_s; }
 
 /// Returns 0 if `value` and `before` have opposite signs, else `value` clamped to [low, high].
@@ -44,12 +43,11 @@ PICTURA_HD inline float stop_at_zero(float before, float value, float low, float
   return before * value < 0.0f ? 0.0f : clamp(value, low, high);
 }
 
-/// Components of a motion along the heading.
 struct LongitudinalMotion {
   float speed_mps = 0, accel_mps2 = 0;
 };
 
-/// Advances the longitudinal motion by one step of dt_s, within `limits`.
+/// Advances by one step within `limits`.
 PICTURA_HD inline LongitudinalMotion move_along(LongitudinalMotion from, float jerk_mps3,
                                                 const DynamicsParameters& parameters, const ClassLimits& limits,
                                                 float dt_s) {
@@ -63,16 +61,15 @@ PICTURA_HD inline LongitudinalMotion move_along(LongitudinalMotion from, float j
   return to;
 }
 
-/// Returns the maximum steering angle. Recordings may contain vehicles that are longer than their class allows; these
-/// get the minimum turning radius of the longest allowed vehicle.
+/// A recorded vehicle that is too long for its class gets the minimum turning radius of the longest allowed vehicle.
 PICTURA_HD inline float max_steer_rad(float wheelbase_m, const ClassLimits& limits) {
   const float longest_m = kWheelbasePerLength * limits.max_length_m;
   if (wheelbase_m <= longest_m) return limits.max_steer_rad;
   return atan_of(tan_of(limits.max_steer_rad) * (wheelbase_m / longest_m));
 }
 
-/// Advances a motion by one step of dt_s. Accelerations, speed and steering respect `limits`. The lateral acceleration
-/// is recomputed from the steering angle, which changes at a limited rate.
+/// Advances by one step within `limits`. The lateral acceleration follows from the steering angle, whose rate is
+/// limited.
 PICTURA_HD inline Motion move(const Motion& from, Controls controls, const DynamicsParameters& parameters,
                               const ClassLimits& limits, float dt_s) {
   constexpr float kMinTurningSpeed_mps = 1.0f;

@@ -1,4 +1,4 @@
-// Implementation of Simulator::set_state(): validation of new values, and computation of derived fields.
+// Implementation of Simulator::set_state().
 #pragma once
 
 #include "pictura/simulator/command.h"
@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// Returns an agent's first field with an invalid value, or `none`.
+/// Returns the first field with an invalid value, or `none`.
 PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions& options, const AgentStateView& agents,
                                            int slot) {
 #define X(name, type, per_agent, first, comment)                                                      \
@@ -42,7 +42,6 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   if (fabsf(agents.y_m[slot]) > kMaxCommanded_m) return AgentField::y_m;
   if (fabsf(agents.z_m[slot]) > kMaxCommanded_m) return AgentField::z_m;
   if (fabsf(agents.heading_rad[slot]) > kMaxCommanded_rad) return AgentField::heading_rad;
-  // Absent agents have no body.
   const bool is_present = has_body(status);
   if (agents.length_m[slot] < 0 || (is_present && agents.length_m[slot] == 0)) return AgentField::length_m;
   if (agents.width_m[slot] < 0 || (is_present && agents.width_m[slot] == 0)) return AgentField::width_m;
@@ -53,7 +52,7 @@ PICTURA_HD inline AgentField invalid_field(const MapView& map, const RuleOptions
   return AgentField::none;
 }
 
-/// Copy of the fields of one agent, outside the state's arrays.
+/// Fields of one agent, outside the state's arrays.
 struct AgentRecord {
 #define X(name, type, per_agent, first, comment) type name[per_agent];
   PICTURA_AGENT_FIELDS(X)
@@ -66,8 +65,7 @@ struct AgentRecord {
   }
 };
 
-/// Returns a copy of the agent that element i of the edit changes, with the edit applied. Derived fields are not
-/// recomputed.
+/// Returns the agent of element i with new values, but with old derived fields.
 PICTURA_HD inline AgentRecord edited_agent(const AgentStateView& agents, const StateEdit& edit, int i) {
   AgentRecord record;
   copy_fields(agents, edit.slots[i], record.view(), 0);
@@ -78,8 +76,7 @@ PICTURA_HD inline AgentRecord edited_agent(const AgentStateView& agents, const S
   return record;
 }
 
-/// Fault of an element of an edit, encoded in one 64-bit word that a host can read atomically. It contains the index of
-/// the field (or kNoSuchSlot or kSlotAgain), the index of the element, and the slot.
+/// Fault in one 64-bit word, which a host can read atomically: field (or kNoSuchSlot or kSlotAgain), element and slot.
 constexpr int64_t kNoEditFault = -1;
 constexpr int32_t kNoSuchSlot = static_cast<int32_t>(AgentField::none), kSlotAgain = kNoSuchSlot + 1;
 PICTURA_HD constexpr int64_t edit_fault(int32_t what, int32_t element, int32_t slot) {
@@ -90,8 +87,8 @@ PICTURA_HD inline bool has_slot(const StateEdit& edit, int i, int num_slots) {
   return edit.slots[i] >= 0 && edit.slots[i] < num_slots;
 }
 
-/// Returns the error of element i, or kNoEditFault. first_element [slots]: index of the first element of the edit for
-/// each slot. world_of(slot) must return the WorldView of the slot's world.
+/// Returns the error of element i, or kNoEditFault. first_element [slots]: first element for each slot. world_of(slot)
+/// must return the slot's WorldView.
 template <typename WorldOf>
 PICTURA_HD int64_t find_edit_fault(const StateEdit& edit, int i, int num_slots, const int32_t* first_element,
                                    const WorldOf& world_of) {
@@ -104,8 +101,8 @@ PICTURA_HD int64_t find_edit_fault(const StateEdit& edit, int i, int num_slots, 
   return field == AgentField::none ? kNoEditFault : edit_fault(static_cast<int32_t>(field), i, slot);
 }
 
-/// Writes the agent of element i, which must be valid, to its world. The agent is moved without testing collisions on
-/// the way. Returns the change in the number of agents in the world's episode.
+/// Writes the agent of element i, which must be valid, without testing collisions on the way. Returns the change in the
+/// number of agents in the episode.
 PICTURA_HD inline int apply_edit(const WorldView& world, const StateEdit& edit, int i) {
   const AgentStateView& agents = world.agents;
   const int slot = edit.slots[i], agent = slot - world.first_slot;

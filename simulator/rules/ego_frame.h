@@ -1,6 +1,5 @@
-// Ego frame in which an agent observes: its origin is the agent's reference point, x points forward and y to the left.
-// Also the scales of observations, and the visible part of the map. docs/reference/observation.md lists the scales;
-// these constants are its source.
+// Ego frame of an agent's observations: origin at the reference point, x forward, y to the left. Also scales
+// (docs/reference/observation.md) and the visible part of the map.
 #pragma once
 
 #include "pictura/simulator/rules/map_view.h"
@@ -11,18 +10,16 @@ namespace pictura {
 constexpr float kScalePosition_m = 120.0f, kScaleHeight_m = 10.0f, kScaleSpeed_mps = 20.0f;
 constexpr float kScaleLength_m = 6.0f, kScaleWidth_m = 3.0f, kScaleHalfPiece_m = 5.0f, kScaleLaneWidth_m = 5.0f;
 constexpr float kScaleWallHeight_m = 12.0f;
-constexpr float kMinConditioning = -2.0f;  // lower bound of observed coefficients
+constexpr float kMinConditioning = -2.0f;  // lower bound
 constexpr float kScaleSteer_rad = 0.55f, kScaleAccelLong_mps2 = 5.0f, kScaleAccelLat_mps2 = 4.0f;
 
-/// Returns the reciprocal of a scale. Observations multiply by reciprocals, because a division would take ten times as
-/// long.
+/// Reciprocal of a scale. A division would take ten times as long as a multiplication.
 PICTURA_HD constexpr float per(float scale) { return 1.0f / scale; }
 
 // Ranges of visibility.
 constexpr float kPartnerRange_m = 100.0f, kControlRange_m = 100.0f;
 constexpr float kRoadAhead_m = 120.0f, kRoadBehind_m = 20.0f, kRoadAside_m = 30.0f;
 
-/// Reference point and orientation of an agent.
 struct EgoFrame {
   Vec3 origin_m;
   Vec2 forward;
@@ -37,8 +34,7 @@ struct EgoFrame {
 constexpr float kRoadMiddle_m = 0.5f * (kRoadAhead_m - kRoadBehind_m);
 constexpr float kRoadHalf_m = 0.5f * (kRoadAhead_m + kRoadBehind_m);
 
-/// Whether the piece's middle is in the visible part of the map. fast/pieces_in_sight.h computes bit-identical results
-/// for eight pieces at a time.
+/// Whether the piece's middle is visible. fast/pieces_in_sight.h computes bit-identical results.
 PICTURA_HD inline bool is_in_sight(const ObservedPiece& piece, const EgoFrame& frame) {
   const Vec2 local_m = frame.turn(piece.middle_m.xy() - frame.origin_m.xy());
   return fabsf(local_m.x - kRoadMiddle_m) <= kRoadHalf_m && fabsf(local_m.y) <= kRoadAside_m;

@@ -1,29 +1,26 @@
-// Entry on roads that end: agents that have left the map wait until there is room at the beginning of a lane, then
-// enter there.
+// Entry on open maps: agents that have left wait for room at the beginning of a lane.
 #pragma once
 
 #include "pictura/simulator/rules/spawn.h"
 
 namespace pictura {
 
-constexpr float kEntryInside_m = 0.1f;  // distance of the rear bumper from the lane's start
+constexpr float kEntryInside_m = 0.1f;  // from the lane's start to the rear bumper
 constexpr float kMaxEntry_mps = 8.0f;
 constexpr float kEntryGap_m = 2.0f, kEntryHeadway_s = 2.0f;  // minimum gap: 2 m plus 2 s times the speed
 
-/// Whether an agent waits to enter. In the step in which it leaves, its box is still visible, so it cannot enter yet.
+/// An agent cannot enter in the step in which it leaves, because its box is still visible.
 PICTURA_HD inline bool is_waiting_to_enter(const WorldView& world, int agent) {
   return world.agents.status[world.first_slot + agent] == AgentStatus::waiting && !world.boxes[agent].drawn;
 }
 
-/// Returns the random entry at which an agent tries to enter at the end of step `step` of the episode. The map must
-/// have entries.
+/// Random entry for the end of step `step`. The map must have entries.
 PICTURA_HD inline const Entry& drawn_entry(const WorldView& world, int agent, int step) {
   RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(step), Purpose::entry);
   return world.map.entries[random.below(static_cast<int>(world.map.entries.size()))];
 }
 
-/// Returns the point distance_m ahead on the route that takes the first successor of each lane; if the route is
-/// shorter, its end.
+/// Returns the point distance_m ahead along first successors, or the route's end.
 PICTURA_HD inline RoutePoint point_ahead(const MapView& map, RoutePoint at, float distance_m) {
   constexpr int kMaxLanesAhead = 64;  // a safety bound
   at.s_m += distance_m;
@@ -35,21 +32,20 @@ PICTURA_HD inline RoutePoint point_ahead(const MapView& map, RoutePoint at, floa
   return {at.lane, min_of(at.s_m, map.lanes[at.lane].length_m)};
 }
 
-/// Returns the position of the reference point of an agent that enters at `entry`.
+/// Reference point of an agent that enters.
 PICTURA_HD inline RoutePoint entry_place(const MapView& map, const Entry& entry, AgentClass agent_class,
                                          float length_m) {
   const float to_rear_m = 0.5f * length_m - reference_to_center(agent_class, length_m);
   return point_ahead(map, {entry.lane, 0.0f}, kEntryInside_m + to_rear_m);
 }
 
-/// The next box ahead on a route.
 struct NextBox {
-  float gap_m = 1e9f;   // from the front bumper, rounded down to a multiple of 0.5 m
+  float gap_m = 1e9f;   // from the front bumper, in multiples of 0.5 m
   float speed_mps = 0;  // along the route
 };
 
-/// Finds the next box on the route of an agent with box `own` and reference point `at`. It searches up to the gap that
-/// an agent must keep at the maximum entry speed.
+/// Finds the next box on the route of an agent with box `own` and reference point `at`, up to the gap required at the
+/// maximum entry speed.
 template <typename ThreadGroup>
 PICTURA_HD NextBox next_box(const WorldView& world, const AgentBox& own, RoutePoint at, const ThreadGroup& group) {
   constexpr float kStride_m = 0.5f;
@@ -82,7 +78,7 @@ PICTURA_HD NextBox next_box(const WorldView& world, const AgentBox& own, RoutePo
   return group.of_lowest(next.gap_m, next_index, next);
 }
 
-/// Whether an agent with a lower index has entered in this step through an entry with this `turn` (see Entry).
+/// Whether an agent with a lower index entered in this step through an entry with this `turn`.
 template <typename ThreadGroup>
 PICTURA_HD bool is_turn_taken(const WorldView& world, int agent, int step, int32_t turn, const ThreadGroup& group) {
   bool is_taken = false;
@@ -112,8 +108,7 @@ PICTURA_HD void begin_life(const WorldView& world, int agent, int step, RoutePoi
   put_on_route(world, agent, at, speed_mps, group);
 }
 
-/// Makes a waiting agent enter at the end of step `step` of the episode if there is room at its random entry. Returns
-/// whether it entered.
+/// Makes a waiting agent enter at the end of step `step` if its random entry has room.
 template <typename ThreadGroup>
 PICTURA_HD bool try_to_enter(const WorldView& world, int agent, int step, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
@@ -136,8 +131,7 @@ PICTURA_HD bool try_to_enter(const WorldView& world, int agent, int step, const 
   return true;
 }
 
-/// Makes waiting agents enter at the end of step `step` of the episode, in the order of their indices. Calls
-/// entered(agent) for each agent that entered.
+/// Makes waiting agents enter at the end of step `step`, in the order of indices. Calls entered(agent) for each.
 template <typename ThreadGroup, typename Entered>
 PICTURA_HD void enter_waiting(const WorldView& world, int step, const ThreadGroup& group, const Entered& entered) {
   if (world.map.entries.empty()) return;

@@ -1,4 +1,4 @@
-// A world's episode: its lights, the results and counts of a step, and the end of the episode.
+// A world's episode: lights, results, counts and end.
 #pragma once
 
 #include "pictura/simulator/rules/step.h"
@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// Arrays [slots] to which a step writes its results; see StepResult.
+/// Arrays [slots] of a step's results; see StepResult.
 struct StepArrays {
   float* reward = nullptr;
   uint8_t* terminated = nullptr;
@@ -21,26 +21,24 @@ PICTURA_HD inline void clear_result(const StepArrays& results, int slot) {
   results.sums[slot] = {};
 }
 
-/// Whether a step accepts a command. Any command to an agent that takes no actions is accepted, because it is ignored.
-/// A command to follow a record needs a map with a record.
+/// An agent that takes no actions accepts every command, because it ignores it. A command to follow a record needs a
+/// map with a record.
 template <typename CommandType>
 PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& command) {
   if (!takes_actions(world, agent)) return true;
   return is_valid(command) && (has_record(world.map) || !is_follow_record_command(command));
 }
 
-/// Whether a step of the agent is counted and used for learning. The agent must take actions, and its command must not
-/// be to leave or to follow the record. In this episode, the agent must be neither impaired nor driven by another
-/// policy.
+/// Whether a step is counted and used for learning. The agent must take an action or a kinematic state, and be neither
+/// impaired nor driven by another policy.
 template <typename CommandType>
 PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType& command) {
   return takes_actions(world, agent) && !is_leave_command(command) && !is_follow_record_command(command) &&
          driver_kind_of(world, agent) == 0;
 }
 
-/// Whether the agent counts as active when its world tests whether the episode ends. Agents that wait to enter count.
-/// Absent agents of a map with a record count too, because they may appear later. They do not count if some tracks are
-/// replayed, because agents absent at the start then take no part in the episode.
+/// Whether the agent counts as active in episode_ends(). Waiting agents do. Absent agents of a map with a record count
+/// too, because they may appear later; with replayed tracks, they never appear.
 PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
   const auto status = world.agents.status[world.first_slot + agent];
   if (has_replayed_tracks(world.map)) return takes_actions(status);
@@ -48,8 +46,7 @@ PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
          (status == AgentStatus::absent && has_record(world.map));
 }
 
-/// Description of a step's rejected command, encoded in one 64-bit word that a host can read atomically: slot, kind
-/// and, for an action, its value.
+/// Rejected command in one 64-bit word, which a host can read atomically: slot, kind and, for an action, its value.
 constexpr int64_t kNoRejection = -1;
 PICTURA_HD constexpr int64_t rejected_command(int32_t slot, CommandKind kind, int32_t action) {
   const auto kind_bits = static_cast<int64_t>(static_cast<uint32_t>(kind) < 4 ? static_cast<uint32_t>(kind) : 4u);
@@ -62,7 +59,7 @@ PICTURA_HD constexpr int64_t rejected_command(int32_t slot, const Command& comma
   return rejected_command(slot, command.kind, command.kind == CommandKind::action ? command.action : 0);
 }
 
-/// Draws the light plan of one stop line for the episode and sets its first state.
+/// Draws a light plan for the episode and sets its first state.
 PICTURA_HD inline void begin_light(const WorldView& world, int light) {
   world.light_plans[light] =
       draw_light_plan(world.map.stop_lines[light], light, world.options.light_cycles, world.options.fixed_lights,
@@ -76,8 +73,7 @@ PICTURA_HD inline void count_events(int events, SimulatorTotals* totals_inout){
 #undef X
 }
 
-/// Phase 3 (see step.h) of one agent in step `step` of the episode, counted from 1: writes its reward and whether its
-/// episode ends.
+/// Phase 3 (step.h) of an agent in step `step` of the episode, counted from 1.
 PICTURA_HD inline void apply_reward_and_halt(const WorldView& world, int agent, int step, const StepArrays& results) {
   const int slot = world.first_slot + agent;
   const float speed_mps = world.agents.speed_mps[slot];
@@ -87,13 +83,13 @@ PICTURA_HD inline void apply_reward_and_halt(const WorldView& world, int agent, 
   if (drives && first_motion_step == 0 && fabsf(speed_mps) > kRest_mps) first_motion_step = step;
   const float distance_m = results.valid[slot] ? driven_m(speed_mps, world.options.dt_s) : 0.0f;
   StepSums sums{distance_m, apply_reward_and_halt(world, agent)};
-  if (is_other) sums = {};  // steps of impaired agents and of other policies are not counted
+  if (is_other) sums = {};  // impaired agents and other policies do not count
   results.sums[slot] = sums;
   results.reward[slot] = sums.reward_terms.total();
   results.terminated[slot] = results.valid[slot] && !is_active(world, agent) && !has_left(world, agent);
 }
 
-/// Counts the step of an agent after phase 3.
+/// Counts an agent's step after phase 3.
 PICTURA_HD inline void count_agent(const WorldView& world, int agent, const StepArrays& results,
                                    SimulatorTotals* totals_inout) {
   const int slot = world.first_slot + agent;
@@ -108,9 +104,8 @@ PICTURA_HD inline void count_agent(const WorldView& world, int agent, const Step
   count_events(world.agents.events[slot], totals_inout);
 }
 
-/// Returns the maximum number of steps of the world's current episode: options.episode_steps. With stagger_episodes, a
-/// world's first episode has U{64, ..., episode_steps} steps instead, so that episodes of different worlds do not end
-/// at the same time. If episode_steps is at most 64, the first episode has episode_steps steps too.
+/// Maximum number of steps of the current episode. With stagger_episodes, the first episode has U{64, ...,
+/// episode_steps} steps, so that worlds do not end episodes together.
 PICTURA_HD inline int max_steps_of(const WorldView& world) {
   constexpr int kMinSteps = 64;
   const int episode_steps = world.options.episode_steps;
@@ -119,17 +114,15 @@ PICTURA_HD inline int max_steps_of(const WorldView& world) {
   return kMinSteps + random.below(episode_steps - kMinSteps + 1);
 }
 
-/// Whether an episode ends after `steps` steps, when `active` of its `spawned` agents are still active. It ends if the
-/// maximum number of steps is reached, if too many agents are inactive, or if there are no agents.
+/// Whether an episode ends after `steps` steps with `active` of `spawned` agents.
 PICTURA_HD inline bool episode_ends(const WorldView& world, int steps, int spawned, int active) {
   if (steps >= max_steps_of(world) || spawned == 0) return true;
   const float inactive = static_cast<float>(spawned - active);
   return inactive >= world.options.reset_inactive_fraction * static_cast<float>(spawned);
 }
 
-/// Finishes a step of an agent. `ends` is whether the world's episode ends with the step. Sets `truncated` for agents
-/// that are still active at the end of the episode and for agents that have left, and counts finished episodes and
-/// lives.
+/// Finishes an agent's step, with which the episode may end (`ends`). Sets `truncated` for agents that are active at
+/// the episode's end or have left. Counts finished episodes and lives.
 PICTURA_HD inline void finish_agent(const WorldView& world, int agent, bool ends, const StepArrays& results,
                                     SimulatorTotals* totals_inout) {
   const int slot = world.first_slot + agent;

@@ -1,4 +1,4 @@
-// Exit from roads that end: tests whether a route ends at a waypoint, and whether an agent leaves the map.
+// Exit from open maps.
 #pragma once
 
 #include "pictura/simulator/rules/collision.h"
@@ -7,16 +7,14 @@
 
 namespace pictura {
 
-/// Upper bound on the distance that an agent moves in a step.
+/// Upper bound on an agent's motion in a step.
 constexpr float kExitReach_m = 5.0f;
 
-/// Whether routes end at this waypoint.
 PICTURA_HD inline bool is_at_route_end(const MapView& map, RoutePoint at) {
   return at.s_m >= map.lanes[at.lane].route_end_m;
 }
 
-/// Whether the middle of a box's front bumper crosses the exit in the direction of traffic. The height of a box is that
-/// of the road under its reference point; the height at the bumper is therefore corrected by the slope.
+/// Whether the middle of the front bumper crosses the exit in the direction of traffic.
 PICTURA_HD inline bool crosses(const Exit& exit, const AgentBox& before, const AgentBox& after) {
   const Vec2 from = front_bumper(before) - exit.middle_m.xy(), to = front_bumper(after) - exit.middle_m.xy();
   const float to_bumper_m = reference_to_center(after.agent_class, after.length_m) + 0.5f * after.length_m;

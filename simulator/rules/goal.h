@@ -1,6 +1,5 @@
-// Goal chains, and the test whether a waypoint is passed. A chain is three waypoints on a random route along the lane
-// network; routes may change lanes. The waypoints are 20 to 60 m apart along the route. On maps whose roads do not end,
-// routes use only lanes from which they can continue without end. On open maps, whose roads end, routes end shortly
+// Goal chains. A chain is three waypoints, 20 to 60 m apart, on a random route along the lane network; routes may
+// change lanes. On closed maps, routes can continue without end. On open maps, whose roads end, routes end shortly
 // before the lanes do.
 #pragma once
 
@@ -11,14 +10,13 @@ namespace pictura {
 
 constexpr float kMinWaypointGap_m = 20.0f, kMaxWaypointGap_m = 60.0f;
 constexpr float kLaneChangeChance = 0.25f;
-/// A waypoint can be passed only if the agent's height differs by less than this from the waypoint's height.
+/// Maximum height difference at which an agent passes a waypoint.
 constexpr float kWaypointLevel_m = 4.0f;
-/// The metric Goals counts the last waypoint of a chain if an agent passes it within this distance (paper, metric
-/// definitions).
+/// Radius of the metric Goals, which counts last waypoints of chains (paper, metric definitions).
 constexpr float kMetricGoalRadius_m = 2.0f;
 
-/// Returns the point beside `at` on the neighbouring lane (`side` < 0: left, else right), at the same fraction of the
-/// lane's length. Returns `at` if there is no such lane.
+/// Returns the point on the neighbouring lane (`side` < 0: left) at the same fraction of its length, or `at` without
+/// such a lane.
 PICTURA_HD inline RoutePoint neighbor_of(const MapView& map, RoutePoint at, int side) {
   const MapLane& lane = map.lanes[at.lane];
   const int32_t neighbor = side < 0 ? lane.left : lane.right;
@@ -26,8 +24,8 @@ PICTURA_HD inline RoutePoint neighbor_of(const MapView& map, RoutePoint at, int 
   return {neighbor, at.s_m * (map.lanes[neighbor].length_m / lane.length_m)};
 }
 
-/// Returns the point beside `at` on the nearest neighbouring lane that has a successor; of two equally near lanes, the
-/// left. Returns `at` itself if its own lane has a successor, or if no lane beside it has a successor.
+/// Returns the point beside `at` on the nearest lane with a successor (left before right). Returns `at` if its own lane
+/// has a successor or no lane has one.
 PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
   const auto goes_on = [&map](RoutePoint p) { return map.lanes[p.lane].num_successors > 0; };
   RoutePoint left = at, right = at;
@@ -40,12 +38,11 @@ PICTURA_HD inline RoutePoint through_lane(const MapView& map, RoutePoint at) {
   return goes_on(left) ? left : right;
 }
 
-/// Returns the point distance_m ahead on a random route. Each successor of a lane is chosen with equal probability. At
-/// the end of a lane without successors, the route continues on the nearest lane beside it that has a successor. The
-/// result is never beyond the point where routes end.
+/// Returns the point distance_m ahead on a random route with equally likely successors. From a lane without successors,
+/// the route continues at through_lane(). The result is never beyond the end of routes.
 PICTURA_HD inline RoutePoint advance_along_lanes(const MapView& map, RoutePoint at, float distance_m,
                                                  RandomStream* random_inout) {
-  constexpr int kMaxLanesWalked = 64;  // a safety bound, for many lanes shorter than a metre
+  constexpr int kMaxLanesWalked = 64;  // a safety bound
   for (int i = 0; i < kMaxLanesWalked; ++i) {
     const float left_m = map.lanes[at.lane].length_m - at.s_m;
     const float route_end_m = map.lanes[at.lane].route_end_m;
@@ -62,7 +59,7 @@ PICTURA_HD inline RoutePoint advance_along_lanes(const MapView& map, RoutePoint 
   return {at.lane, map.lanes[at.lane].length_m};
 }
 
-/// Returns the next waypoint of a route: a random gap ahead, after a lane change with probability kLaneChangeChance.
+/// Returns a point a random gap ahead, after a lane change with probability kLaneChangeChance.
 PICTURA_HD inline RoutePoint next_waypoint(const MapView& map, RoutePoint at, RandomStream* random_inout) {
   const float gap_m = random_inout->uniform(kMinWaypointGap_m, kMaxWaypointGap_m);
   const float change = random_inout->uniform();
@@ -70,8 +67,7 @@ PICTURA_HD inline RoutePoint next_waypoint(const MapView& map, RoutePoint at, Ra
   return advance_along_lanes(map, at, gap_m, random_inout);
 }
 
-/// Whether the straight line from `from` to `to` comes within radius_m of `goal` in plan. The height of `to` must
-/// differ by less than kWaypointLevel_m from that of `goal`.
+/// Whether the line `from`-`to` comes within radius_m of `goal` in plan, with `to` on the goal's level.
 PICTURA_HD inline bool passes(Vec3 from, Vec3 to, Vec3 goal, float radius_m) {
   if (fabsf(to.z - goal.z) >= kWaypointLevel_m) return false;
   const Vec2 way = to.xy() - from.xy();

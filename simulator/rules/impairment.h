@@ -1,5 +1,5 @@
-// Agents that are impaired or driven by other policies: how each episode draws them, when impairments are active, and
-// what impairments do. All of this is computed from counter-based random numbers, so the state does not store it.
+// Agents that are impaired or driven by other policies. Counter-based random numbers determine these agents, so the
+// state does not store them.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -9,8 +9,7 @@
 
 namespace pictura {
 
-/// Draws an agent's driver kind for an episode: 0 for an agent that learns, else 1 + the index of a share in the order
-/// of OtherShares.
+/// Draws an agent's driver kind for an episode: 0 for a learning agent, else 1 + the index of a share in OtherShares.
 PICTURA_HD inline int draw_driver_kind(const OtherShares& shares, uint64_t seed, uint32_t world, uint32_t agent,
                                        uint32_t episode) {
   if (shares.sum() <= 0.0f) return 0;
@@ -30,22 +29,19 @@ PICTURA_HD inline int draw_driver_kind(const OtherShares& shares, uint64_t seed,
   return 0;
 }
 
-/// Convert a result of draw_driver_kind() to the impairment and to the driver of the agent. The driver is 0 for the
-/// learning policy, and 1 + i for policy i of OtherShares::policies.
+/// Convert a driver kind. driver_of() is 0 for the learning policy, and 1 + i for policy i of OtherShares::policies.
 PICTURA_HD constexpr Impairment impairment_of(int other) {
   return other > kNumImpairments ? Impairment::none : static_cast<Impairment>(other);
 }
 PICTURA_HD constexpr int driver_of(int other) { return max_of(other - kNumImpairments, 0); }
 
-/// Draws an agent's impairment in an episode.
 PICTURA_HD inline Impairment draw_impairment(const OtherShares& shares, uint64_t seed, uint32_t world, uint32_t agent,
                                              uint32_t episode) {
   return impairment_of(draw_driver_kind(shares, seed, world, agent, episode));
 }
 
-/// Whether an impairment affects the agent's observation and next action after `step` steps of the episode.
-/// `inattentive` is always active. The other impairments are active once in every period of 10 s, for U(1, 5) s from a
-/// random time on.
+/// Whether an impairment is active after `step` steps of the episode. `inattentive` is always active. The others are
+/// active once in every 10 s, for U(1, 5) s.
 PICTURA_HD inline bool is_active_at(Impairment impairment, int step, float dt_s, uint64_t seed, uint32_t world,
                                     uint32_t agent, uint32_t episode) {
   constexpr float kPeriod_s = 10.0f, kMinSpell_s = 1.0f, kMaxSpell_s = 5.0f;
@@ -62,14 +58,13 @@ PICTURA_HD inline bool is_active_at(Impairment impairment, int step, float dt_s,
   return since_begin >= 0 && since_begin < spell_steps;
 }
 
-/// Returns the objects that an active impairment hides from an agent's images and observations.
+/// Objects that an active impairment hides from images and observations.
 PICTURA_HD constexpr Hides hidden_by(Impairment shown) {
   if (shown == Impairment::blind) return kHidesAgents;
   return shown == Impairment::inattentive ? kHidesLights : kHidesNothing;
 }
 
-/// Returns the longitudinal jerk of phantom braking (braking for no reason). It is opposite to the motion; an agent at
-/// rest stays at rest.
+/// Jerk of braking for no reason, opposite to the motion. An agent at rest stays at rest.
 PICTURA_HD inline float braking_jerk_mps3(const Motion& motion) {
   const float hardest_mps3 = controls_of_action(0).jerk_long_mps3;
   const float forwards = motion.speed_mps != 0.0f ? motion.speed_mps : motion.accel_long_mps2;

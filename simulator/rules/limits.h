@@ -1,6 +1,5 @@
-// Limits of the dynamics and sizes of each class of agents, listed in docs/explanation/simulator.md. Limits of vehicles
-// are those of the reference implementation of the paper's dynamics; limits of cyclists and pedestrians are this
-// project's choice.
+// Limits of the dynamics and sizes of each class (docs/explanation/simulator.md). Limits of vehicles are those of the
+// reference implementation of the paper's dynamics; others are this project's choice.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -25,12 +24,12 @@ PICTURA_HD constexpr ClassLimits class_limits(AgentClass agent_class) {
   }
 }
 
-/// Maximum speed of any class. Recorded traffic may be faster and larger, so the rules use MapView::max_speed_mps and
-/// MapView::max_box_radius_m instead of this constant and the next.
+/// Maximum speed of any class. Recorded traffic may exceed this limit and the next, so rules use MapView::max_speed_mps
+/// and MapView::max_box_radius_m.
 constexpr float kMaxSpeed_mps = 20.0f;
-/// Maximum half-diagonal of a box of any class.
+/// Maximum half-diagonal of any class.
 constexpr float kMaxBoxRadius_m = 3.2f;
-/// Maximum duration of a step. It is short, because contact with barriers is tested only at the end of a step.
+/// Contact with barriers is tested only at the end of a step, so steps must be short.
 constexpr float kMaxStep_s = 0.1f;
 
 PICTURA_HD constexpr bool keeps_bounds(const ClassLimits& limits) {
@@ -43,8 +42,8 @@ static_assert(keeps_bounds(class_limits(AgentClass::vehicle)) && keeps_bounds(cl
 
 constexpr float kWheelbasePerLength = 0.6f;
 
-/// Returns the distance from an agent's reference point forward to its box's centre. The reference point of vehicles
-/// and cyclists is the rear axle, half a wheelbase behind the centre; that of pedestrians is the centre.
+/// Distance from the reference point forward to the box's centre. The reference point of vehicles and cyclists is the
+/// rear axle, half a wheelbase behind the centre.
 PICTURA_HD constexpr float reference_to_center(AgentClass agent_class, float length_m) {
   return agent_class == AgentClass::pedestrian ? 0.0f : 0.5f * kWheelbasePerLength * length_m;
 }

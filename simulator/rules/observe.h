@@ -1,5 +1,4 @@
-// Observations of an agent in its own frame (ego_frame.h), scaled to about [-1, 1]. docs/reference/observation.md lists
-// all observed numbers.
+// Observations of an agent in its ego frame, scaled to about [-1, 1] (docs/reference/observation.md).
 #pragma once
 
 #include "pictura/common/portable/async_copy.h"
@@ -29,9 +28,9 @@ PICTURA_HD inline void observe_ego(const WorldView& world, int slot, float* out)
   out[8] = auxiliary && agents.lane[slot] >= 0 ? cos_of(agents.lane_angle_rad[slot]) : 0.0f;
 }
 
-/// Writes the observed conditioning. It is scaled by the paper's training ranges (conditioning_scale), not by those of
-/// the run, so that equal coefficients are observed equally in all runs. Coefficients that the paper does not vary are
-/// observed as 0. Coefficients of pedestrians may be below the range; they are observed as at least -2.
+/// Scales conditioning by the paper's training ranges, so that all runs observe equal coefficients equally.
+/// Coefficients that the paper does not vary are observed as 0. Pedestrians' coefficients below the range are observed
+/// as at least -2.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* out, const ThreadGroup& group = {}) {
   for (int i = group.rank(); i < kNumConditioning; i += group.size()) {
@@ -43,7 +42,7 @@ PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* ou
   }
 }
 
-/// Writes the active waypoint and the waypoints after it. The chain's last waypoint is repeated to fill all rows.
+/// Writes the active waypoint and those after it. The last waypoint fills the remaining rows.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFrame& frame, float* out,
                                   const ThreadGroup& group = {}) {
@@ -56,29 +55,26 @@ PICTURA_HD void observe_waypoints(const WorldView& world, int slot, const EgoFra
   }
 }
 
-/// Finds the partners of `agent`: the nearest other boxes by distance from the agent's reference point to their
-/// centres. Searches the nearest cells first. If these contain too few boxes, it searches all cells within
-/// kPartnerRange_m; in a world with many boxes, it doubles the search radius instead.
+/// Finds the partners of `agent`: the other boxes whose centres are nearest to its reference point. Without enough
+/// boxes in near cells, it searches up to kPartnerRange_m; in a world with many boxes, it doubles the radius instead.
 template <typename ThreadGroup>
 PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) {
   using Nearest = typename ThreadGroup::template Nearest<kMaxPartners>;
   const GridView& cells = world.box_cells;
-  constexpr int32_t kFew = 256;  // up to this number, reading all boxes is faster than selecting near boxes
+  constexpr int32_t kFew = 256;  // up to this number, reading all boxes is faster
   const bool is_crowd = cells.begin[cells.begin.size() - 1] > kFew;
-  // A cell may be wider than the visible range: on a GPU, a world may have a single cell.
+  // A cell may be wider than the visible range, for instance on a GPU.
   for (float reach = min_of(cells.cell_m, kPartnerRange_m);;
        reach = is_crowd ? min_of(2.0f * reach, kPartnerRange_m) : kPartnerRange_m) {
     const CellRows range = cells_around(cells, origin, reach);
     const bool is_near = reach < kPartnerRange_m;
     int found = 0;
     for (int y = range.y0; y <= range.y1 && is_near; ++y) found += range.end(cells, y) - range.begin(cells, y);
-    // Usually at most half of the boxes in the cells are within reach. So the cells should contain at least 2 *
-    // kMaxPartners boxes.
+    // Usually at most half of these boxes are within reach.
     if (is_near && found < 2 * kMaxPartners) continue;
     Nearest nearest;
     if constexpr (ThreadGroup::kSize == 1) {
-      // Boxes of consecutive rows of cells are contiguous. If these are few boxes, one loop reads all rows at once,
-      // including boxes outside the range's columns.
+      // Boxes of consecutive rows are contiguous. If they are few, one loop over all is faster.
       const bool at_once = range.end(cells, range.y1) - range.begin(cells, range.y0) <= kFew;
       for (int y = range.y0; y <= range.y1; ++y) {
         const int32_t begin = range.begin(cells, y);
@@ -89,7 +85,7 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
     } else {
       for (int y = range.y0; y <= range.y1; ++y) {
         const int32_t begin = range.begin(cells, y), end = range.end(cells, y);
-        constexpr int kAtOnce = 4;  // number of loads in flight
+        constexpr int kAtOnce = 4;  // loads in flight
         for (int32_t first = begin + group.rank(); first - group.rank() < end; first += kAtOnce * group.size()) {
           int32_t others[kAtOnce];
           Vec2 centers[kAtOnce];
@@ -112,7 +108,7 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
   }
 }
 
-/// Variant of nearest_partners() that searches the boxes box_at(i), i < num_boxes, for which is_present(i) holds.
+/// Searches the boxes box_at(i), i < num_boxes, for which is_present(i) holds.
 template <typename ThreadGroup, typename BoxAt, typename IsPresent>
 PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsPresent& is_present, Vec2 origin,
                               const ThreadGroup& group) {
@@ -128,7 +124,7 @@ PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsPresen
   return nearest;
 }
 
-/// Returns the observed speed of a box; 0 for parked cars.
+/// 0 for parked cars.
 PICTURA_HD inline float observed_speed_mps(const WorldView& world, int box) {
   if (!world.options.auxiliary_observations) return 0.0f;
   if (box < world.num_agents) return world.agents.speed_mps[world.first_slot + box];
@@ -149,15 +145,14 @@ PICTURA_HD int observe_partners(const WorldView& world, int agent, const EgoFram
   return count;
 }
 
-/// A map's pieces of one kind, and the indices of those that may be visible from the agent's place.
+/// Pieces of one kind, and indices of those that may be visible.
 struct PieceList {
   Span<const ObservedPiece> pieces;
   Span<const Vec2> middles;
   Span<const int32_t> items;
 };
 
-/// Writes the observed lanes, boundaries or walls: the first `capacity` pieces of near.items whose middles are in
-/// sight.
+/// Writes the first `capacity` visible pieces.
 PICTURA_HD inline int observe_pieces(const PieceList& near, const EgoFrame& frame, int capacity, float* out) {
   constexpr int kMaxPieces = max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls);
   int32_t found[kMaxPieces + kFoundBeyond];
@@ -166,15 +161,13 @@ PICTURA_HD inline int observe_pieces(const PieceList& near, const EgoFrame& fram
   return count;
 }
 
-/// Returns the observed code of a light: red 1, yellow 0.5, green -1, else 0. Integer arithmetic avoids branches, which
-/// would be hard to predict, because the lights around an agent differ.
+/// Integer arithmetic avoids branches, which are hard to predict because lights differ.
 PICTURA_HD constexpr float light_code(LightState state) {
   const int halves = 2 * (state == LightState::red) + (state == LightState::yellow) - 2 * (state == LightState::green);
   return 0.5f * static_cast<float>(halves);
 }
 
-/// Writes the nearest stop lines: left and right end, height, light state, and whether the line controls the ego's
-/// lane.
+/// Writes the nearest stop lines.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlace& place, const EgoFrame& frame,
                                 float* rows, const ThreadGroup& group = {}) {
@@ -208,22 +201,20 @@ PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlac
   return count;
 }
 
-/// Whether the agent's observation can be used: the agent takes actions, or this is the last observation of its episode
-/// or life.
+/// Whether the observation can be used: the agent takes actions, or its episode or life ended in this step.
 PICTURA_HD inline bool observes(const WorldView& world, int agent) {
   return takes_actions(world, agent) || has_left(world, agent) ||
          (world.agents.events[world.first_slot + agent] & kInfractions) != 0;
 }
 
-/// Whether the agent's entity set may be nonempty. `hidden` must be the result of hidden_from().
+/// Whether the entity set may be nonempty. `hidden` must be the result of hidden_from().
 PICTURA_HD inline bool observes_set(const WorldView& world, int agent, EntitySet set, Hides hidden) {
   const bool is_hidden =
       (set == EntitySet::partners && hidden == kHidesAgents) || (set == EntitySet::controls && hidden == kHidesLights);
   return !is_hidden && observes(world, agent);
 }
 
-/// Writes the arrays of part `own` (all except entity sets) of an agent to a row of `out`. They are zeros for absent
-/// agents and for agents that halted in an earlier step.
+/// Writes the arrays of part `own`: zeros for absent agents and for agents that halted in an earlier step.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_own(const WorldView& world, int agent, int row, const ObservationView& out,
                             const ThreadGroup& group = {}) {
@@ -243,12 +234,12 @@ PICTURA_HD void observe_own(const WorldView& world, int agent, int row, const Ob
   for (int i = group.rank(); i < kNumWaypoints * kWaypointFeatures; i += group.size()) waypoints[i] = 0.0f;
 }
 
-/// Returns the number of entity sets that are written: all, or all except walls.
+/// All sets, or all except walls.
 PICTURA_HD inline int num_observed_sets(const ObservationView& out) {
   return out.walls.empty() ? static_cast<int>(EntitySet::walls) : kNumEntitySets;
 }
 
-/// Destination of one entity set of one observation.
+/// Destination of an entity set.
 struct SetRows {
   float* rows = nullptr;
   int features = 0, capacity = 0;
@@ -287,7 +278,7 @@ PICTURA_HD inline PieceList pieces_near(const MapView& map, const NearPlace& pla
   }
 }
 
-/// Prefetches the list that pieces_near() returns, because all lists together do not fit into a core's caches.
+/// Prefetches the list of pieces_near(), because all lists together exceed a core's caches.
 PICTURA_HD inline void prefetch_list_near(const MapView& map, const NearPlace& place, EntitySet set) {
   constexpr int kLines = 5, kLineBytes = 64;  // enough for most lists
   if (set == EntitySet::partners || set == EntitySet::controls) return;
@@ -295,10 +286,9 @@ PICTURA_HD inline void prefetch_list_near(const MapView& map, const NearPlace& p
   for (int line = 0; line < kLines; ++line) prefetch(items, line * kLineBytes);
 }
 
-/// Argument of observe_set() for a step. The destination contains the rows of the previous step.
+/// Argument of observe_set() for a step, which overwrites the previous step's rows.
 struct StepObservation {
-  /// Returns the number of rows that may contain values other than zero. The count is clamped, because callers have
-  /// access to the memory and may have changed it.
+  /// Number of rows that may be nonzero; clamped, because callers may have changed the count.
   PICTURA_HD static int num_filled(const SetRows& set) { return min_of(max_of(*set.count, 0), set.capacity); }
   template <typename ThreadGroup>
   PICTURA_HD static int observe_partners(const WorldView& world, int agent, const EgoFrame& frame, float* rows,
@@ -307,8 +297,7 @@ struct StepObservation {
   }
 };
 
-/// Writes one entity set. It is empty for absent agents, for agents that halted in an earlier step, and for agents from
-/// which it is hidden.
+/// Writes one entity set: empty if hidden, and for agents that are absent or halted in an earlier step.
 template <typename Observation>
 PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& place, EntitySet set,
                             const SetRows& out, const Observation& observation) {
@@ -329,13 +318,13 @@ PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& 
   *out.count = count;
 }
 
-/// Writes the observations of agents [begin, end) of a world, including entity sets if `entity_sets`. For a block of
-/// agents, it writes one kind of set after another, so that the map data of a kind stay in the cache.
+/// Writes the observations of agents [begin, end). Each block of agents writes one kind of set after another, so that
+/// map data stay in the cache.
 PICTURA_HD inline void observe(const WorldView& world, int begin, int end, bool entity_sets,
                                const ObservationView& out) {
   for (int agent = begin; agent < end; ++agent) observe_own(world, agent, world.first_slot + agent, out);
   if (!entity_sets) return;
-  constexpr int kBlock = 128, kAhead = 2;  // agents per block, and number of agents to prefetch ahead
+  constexpr int kBlock = 128, kAhead = 2;  // agents; agents to prefetch ahead
   NearPlace places[kBlock];
   for (int first = begin; first < end; first += kBlock) {
     const int count = min_of(kBlock, end - first);

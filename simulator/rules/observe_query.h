@@ -1,4 +1,4 @@
-// Hypothetical observations: those that an agent would have if some boxes were hidden and others were inserted.
+// Hypothetical observations; see Simulator::observe().
 #pragma once
 
 #include "pictura/simulator/observation_query.h"
@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// Argument of observe_set() for a query. The destination may contain any previous values.
+/// Argument of observe_set() for a query. The destination may contain any values.
 class QueriedObservation {
  public:
   PICTURA_HD QueriedObservation(const ObservationQueries& asked, const ObservationQuery& query)
@@ -49,8 +49,7 @@ class QueriedObservation {
     return false;
   }
 
-  /// Variant of pictura::nearest_partners() that excludes hidden boxes and includes inserted boxes. Item num_boxes + i
-  /// is inserted box i.
+  /// Excludes hidden boxes and includes inserted boxes: item num_boxes + i is inserted box i.
   template <typename ThreadGroup>
   PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin, const ThreadGroup& group) const {
     const auto box_at = [&](int item) -> const AgentBox& {
@@ -67,13 +66,13 @@ class QueriedObservation {
   bool leaves_gaps_ = false;
 };
 
-/// Clears the counts of entity sets that are not written.
+/// Clears the counts of sets that are not written.
 PICTURA_HD inline void clear_other_counts(const ObservationView& out, int row) {
   int32_t* counts = out.set_counts.data() + static_cast<size_t>(row) * kNumEntitySets;
   for (int set = num_observed_sets(out); set < kNumEntitySets; ++set) counts[set] = 0;
 }
 
-/// Writes the observation of query i, which must be valid, including entity sets if `entity_sets`.
+/// Writes the observation of query i, which must be valid.
 PICTURA_HD inline void answer_query(const WorldView& world, const ObservationQueries& asked, int i, bool entity_sets) {
   const ObservationQuery& query = asked.queries[i];
   const int agent = query.slot - world.first_slot;
@@ -88,8 +87,8 @@ PICTURA_HD inline void answer_query(const WorldView& world, const ObservationQue
   clear_other_counts(asked.out, i);
 }
 
-/// Kind of error of a query. query_fault() encodes the kind, the query and the wrong value in one 64-bit word, which a
-/// host can read atomically.
+/// Kind of error of a query. query_fault() encodes kind, query and wrong value in one 64-bit word, which a host can
+/// read atomically.
 enum class QueryFault : int32_t {
   slot,
   hidden_begin,
@@ -100,19 +99,19 @@ enum class QueryFault : int32_t {
   inserted_box
 };
 constexpr int64_t kNoQueryFault = -1;
-constexpr int kMaxQueries = 1 << 24;  // maximum number of queries per call
+constexpr int kMaxQueries = 1 << 24;  // per call
 PICTURA_HD constexpr int64_t query_fault(QueryFault what, int32_t query, int32_t value) {
   return (int64_t{static_cast<int32_t>(what)} << 56) | (int64_t{query} << 32) | static_cast<uint32_t>(value);
 }
 
-/// Whether all observed values of a box are finite.
+/// Whether all observed values are finite.
 PICTURA_HD inline bool is_valid(const InsertedBox& one) {
   const AgentBox& box = one.box;
   return is_finite(box.center_m) && is_finite(box.cos_heading) && is_finite(box.sin_heading) &&
          is_finite(box.length_m) && is_finite(box.width_m) && is_finite(box.height_m) && is_finite(one.speed_mps);
 }
 
-/// Returns the error of query i, or kNoQueryFault. world_of(slot) must return the WorldView of the slot's world.
+/// Returns the error of query i, or kNoQueryFault. world_of(slot) must return the slot's WorldView.
 template <typename WorldOf>
 PICTURA_HD int64_t find_query_fault(const ObservationQueries& asked, int i, int num_slots, const WorldOf& world_of) {
   const ObservationQuery& query = asked.queries[i];

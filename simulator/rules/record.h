@@ -1,4 +1,4 @@
-// Agents that follow the records of a recorded scene: their size, their state at each step, and their goal.
+// Agents that follow the records of a recorded scene.
 #pragma once
 
 #include "pictura/simulator/rules/walk.h"
@@ -6,12 +6,10 @@
 
 namespace pictura {
 
-/// Values of the field goal_chains on maps with a record: kRecordedGoal until the agent passes its only goal (the end
-/// of its record), then kRecordedGoalReached.
+/// Values of goal_chains on maps with a record, where an agent has only one goal.
 constexpr int32_t kRecordedGoal = 1, kRecordedGoalReached = 2;
 
-/// Returns the recorded state of an agent `step` steps after its episode's start. After the record's end, it is the
-/// last recorded state, but with speed 0.
+/// Returns the state `step` steps after the episode's start. After the record's end, it is the last state with speed 0.
 PICTURA_HD inline RecordedState recorded_state(const MapView& map, int agent, int step) {
   const int last = map.recorded_steps - 1;
   RecordedState state = map.recorded_states[static_cast<size_t>(agent) * static_cast<size_t>(map.recorded_steps) +
@@ -28,7 +26,6 @@ PICTURA_HD inline void store_recorded_size(const WorldView& world, int agent) {
   world.agents.height_m[slot] = recorded.height_m;
 }
 
-/// Whether an agent is a pedestrian.
 PICTURA_HD inline bool walks(const WorldView& world, int agent) {
   return world.agents.agent_class[world.first_slot + agent] == AgentClass::pedestrian;
 }
@@ -47,22 +44,21 @@ PICTURA_HD LaneFit fit_agent(const WorldView& world, int agent, Vec2 p, float z_
                    group);
 }
 
-/// Removes the box of an agent that no longer has a body.
+/// Removes the box of an agent without a body.
 PICTURA_HD inline void remove_box(const WorldView& world, int agent) {
   const int slot = world.first_slot + agent;
   world.agents.events[slot] = kEventNone;
   world.boxes[agent] = world.boxes_before[agent] = box_of(world.agents, slot);
 }
 
-/// Removes an agent from its world's episode.
 PICTURA_HD inline void leave(const WorldView& world, int agent) {
   world.agents.status[world.first_slot + agent] = AgentStatus::absent;
   remove_box(world, agent);
 }
 
-/// Places an agent at its recorded state `step` steps after the episode's start, or removes the agent if that step has
-/// no recorded state. An agent that did not follow its record before is moved there without testing collisions on the
-/// way. Only the first thread of the group writes.
+/// Places an agent at its recorded state `step` steps after the episode's start, or removes it without such a state. An
+/// agent that did not follow its record before is not tested for collisions on the way. Only the first thread of the
+/// group writes.
 template <typename ThreadGroup>
 PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
@@ -92,15 +88,13 @@ PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const
   world.boxes_before[agent] = goes_on ? before : world.boxes[agent];
 }
 
-/// Returns the state of replayed track i `step` steps after its episode's start. Its is_present is 0 if the map has at
-/// most i replayed tracks.
+/// Returns the state of replayed track i `step` steps after the episode's start; is_present is 0 without such a track.
 PICTURA_HD inline RecordedState replayed_state(const MapView& map, int i, int step) {
   const int agent = map.first_replayed + i;
   return agent < static_cast<int>(map.recorded_agents.size()) ? recorded_state(map, agent, step) : RecordedState{};
 }
 
-/// Box num_agents + i belongs to replayed track i. Places the box at the track's state `step` steps after the episode's
-/// start, or removes it if the track is absent then. Only the first thread of the group writes.
+/// Places or removes the box of replayed track i. Only the first thread of the group writes.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void replay_track(const WorldView& world, int i, int step, const ThreadGroup& group = {}) {
   const RecordedState at = replayed_state(world.map, i, step);
@@ -121,8 +115,7 @@ PICTURA_HD void replay_track(const WorldView& world, int i, int step, const Thre
   own = box;
 }
 
-/// Starts the episode of a recorded agent. All of its waypoints are its goal, the end of its record; the last waypoint
-/// is active.
+/// Starts the episode of a recorded agent, whose waypoints are all at the end of its record.
 template <typename ThreadGroup>
 PICTURA_HD void begin_record(const WorldView& world, int agent, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;

@@ -1,4 +1,4 @@
-// The eleven reward terms (paper, appendix, equation of the reward terms).
+// Reward terms (paper, appendix, equation of the reward terms).
 #pragma once
 
 #include "pictura/common/math.h"
@@ -9,16 +9,16 @@
 
 namespace pictura {
 
-/// Events and state of a step from which the reward is computed.
+/// Events and state of a step for the reward.
 struct StepFacts {
-  Motion motion;  // after the step, but before an infraction halts the agent
+  Motion motion;  // before an infraction halts the agent
   LaneFit fit;
   bool passed_waypoint = false;  // an intermediate waypoint
   bool passed_last_waypoint = false;
-  bool collision = false, off_road = false, red_light = false;  // off_road includes contact with a wall
+  bool collision = false, off_road = false, red_light = false;  // off_road includes walls
 };
 
-/// Computes the reward terms. coefficients: the agent's conditioning, in the order of Conditioning.
+/// coefficients: the agent's conditioning.
 PICTURA_HD inline RewardTerms reward_terms(const StepFacts& facts, const float* coefficients, float dt_s) {
   const Motion& m = facts.motion;
   const auto coefficient = [coefficients](Conditioning which) { return coefficients[static_cast<int>(which)]; };

@@ -1,5 +1,4 @@
-// Position of an agent on the lane network: its lane, its offset from the lane, its angle to the lane and the height of
-// the road. Also the test whether a point is on the drivable surface.
+// Position of an agent on the lane network and on the drivable surface.
 #pragma once
 
 #include "pictura/map/speed_limit.h"
@@ -8,9 +7,9 @@
 
 namespace pictura {
 
-/// Each lane's surface is widened by this margin on both sides, to cover gaps between neighbouring lanes.
+/// Margin on both sides of each lane, to cover gaps between lanes.
 constexpr float kSeamTolerance_m = 0.1f;
-/// Offset of an agent that is on no lane, as in the paper's reference implementation. Its angle is then a right angle.
+/// Offset of an agent on no lane, as in the paper's reference implementation. The angle is a right angle.
 constexpr float kNoLaneOffset_m = 4.0f;
 
 /// Position of an agent relative to its lane.
@@ -22,7 +21,7 @@ struct LaneFit {
   float speed_limit_mps = kDefaultSpeedLimit_mps;
 };
 
-/// Foot of the perpendicular from a point to a segment.
+/// Foot of the perpendicular to a segment.
 struct Foot {
   float along_m = 0;  // in [0, length]
   float distance_m = 0;
@@ -35,10 +34,10 @@ PICTURA_HD inline Foot foot_on(const LaneSegment& segment, Vec2 p) {
   return {along, length(from_a - segment.direction * along), cross(segment.direction, from_a)};
 }
 
-/// Returns the lane that fits position and heading best: the lane of minimum cost. The cost is the distance to the
-/// centre line (0.7 per 4 m) plus the angle to it (0.3 per half turn). Lanes other than current_lane (-1: none) cost
-/// 0.05 more, so that an agent between two lanes stays on its lane. Only lanes on the level of z_m, the agent's current
-/// height, are considered. If there is no lane within kLaneReach_m, the result has lane -1 and z_m is unchanged.
+/// Returns the lane of minimum cost. The cost is the distance to the centre line (0.7 per 4 m) plus the angle to it
+/// (0.3 per half turn). Lanes other than current_lane (-1: none) cost 0.05 more, so that an agent between two lanes
+/// stays on its lane. Considers only lanes on the level of z_m. Without a lane within kLaneReach_m, returns lane -1 and
+/// height z_m.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane,
                             const ThreadGroup& group = {}) {
@@ -72,9 +71,8 @@ PICTURA_HD LaneFit fit_lane(const MapView& map, Vec2 p, float z_m, float heading
   return group.of_lowest(best_score, best_item, best);
 }
 
-/// Whether a point is on the drivable surface of its level: within half a lane's width of a drivable lane's centre
-/// line. On maps with a record, lanes do not give the extent of the road; there, the point must be on the road's side
-/// of the nearest edge.
+/// Whether a point is on the drivable surface of its level: within half a lane's width of a centre line. On maps with a
+/// record, it must be on the road's side of the nearest edge, because lanes do not give the road's extent.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const ThreadGroup& group = {}) {
   if (has_record(map)) return road_side(map.side_edges, map.side_cells, {p.x, p.y, z_m}, group).is_on_road;
@@ -90,19 +88,18 @@ PICTURA_HD bool is_on_road(const MapView& map, Vec2 p, float z_m, const ThreadGr
   return group.any(is_on);
 }
 
-/// A point of a route: a lane (for pedestrians, a piece of a walkway) and the arc length on it.
+/// A lane or a piece of a walkway, and the arc length on it.
 struct RoutePoint {
   int32_t lane = -1;
   float s_m = 0;
 };
 
-/// Position and heading of a point on a lane's centre line.
 struct LanePose {
   Vec3 position_m;
   float heading_rad = 0;
 };
 
-/// Returns the pose at arc length s_m, clamped to the lane.
+/// s_m is clamped to the lane.
 PICTURA_HD inline LanePose pose_on_lane(const MapView& map, int32_t lane_index, float s_m) {
   const MapLane& lane = map.lanes[lane_index];
   int low = lane.first_segment, high = lane.first_segment + lane.num_segments - 1;

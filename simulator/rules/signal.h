@@ -1,4 +1,4 @@
-// Traffic lights: their states over time, and the definition of running a red light.
+// Traffic lights, and running a red light.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -8,8 +8,8 @@
 
 namespace pictura {
 
-/// Light cycle of one stop line in one episode; durations are in steps. The phases of a junction take turns: one phase
-/// is green, then yellow, then red, while the other phases are red.
+/// Light cycle of a stop line in an episode. The phases of a junction take turns: one phase is green, then yellow, then
+/// red, while the others are red.
 struct LightPlan {
   int32_t green_steps = 0, yellow_steps = 0, red_steps = 0;
   int32_t offset_steps = 0;
@@ -18,18 +18,16 @@ struct LightPlan {
   uint8_t padding[3] = {};
 };
 
-/// Draws a stop line's plan for an episode. By default (training), it draws green U(1, 10) s, yellow U(1.5, 2.25) s,
-/// red U(0.3, 10) s and a time offset for each junction. With independent cycles, it draws them for each light. In a
-/// fifth of the episodes all lights are off; in the others, a fifth of the lights are off. With independent cycles, a
-/// light that is not off is green during the whole episode with probability 0.05. With `fixed` (evaluation), durations
-/// are 10, 3 and 2 s; only the offset is drawn, and no light is off or always green. Lines without a junction always
-/// cycle independently.
+/// Draws a stop line's plan for an episode. By default (training), each junction has green U(1, 10) s, yellow U(1.5,
+/// 2.25) s, red U(0.3, 10) s and a time offset. In a fifth of the episodes all lights are off; in the others, a fifth
+/// of the lights are off. Independent cycles are drawn for each light; a light that is not off is always green with
+/// probability 0.05. With `fixed` (evaluation), durations are 10, 3 and 2 s, and only the offset is drawn. Lines
+/// without a junction cycle independently.
 PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light, LightCycles cycles, bool fixed,
                                             float dt_s, uint64_t seed, uint32_t world, uint32_t episode) {
   constexpr float kOffFraction = 0.2f, kAlwaysGreenFraction = 0.05f;
   constexpr uint32_t kEpisodeKey = 0, kJunctionKey = 1, kLightKey = 2, kLoneLightKey = 3;
-  // In the keys of random numbers, `agent` tells whether the numbers belong to the episode, a junction or a light, and
-  // `step` is the index of the junction or light.
+  // `agent` is the kind of the key (episode, junction or light), and `step` is the index of the junction or light.
   const bool is_independent = cycles == LightCycles::independent;
   const bool is_alone = is_independent || line.junction < 0;
   const uint32_t group = static_cast<uint32_t>(is_alone ? light : line.junction);
@@ -61,7 +59,7 @@ PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light,
     const bool is_off_alone = own.uniform() < kOffFraction;
     plan.is_off = whole_episode.uniform() < kOffFraction || is_off_alone;
     if (is_independent && own.uniform() < kAlwaysGreenFraction) {
-      plan.green_steps = 1;  // the cycle is one green step
+      plan.green_steps = 1;
       plan.yellow_steps = plan.red_steps = plan.offset_steps = 0;
     }
   }
@@ -78,34 +76,31 @@ PICTURA_HD inline LightState light_state(const LightPlan& plan, int step) {
   return in_slot < plan.green_steps + plan.yellow_steps ? LightState::yellow : LightState::red;
 }
 
-/// Returns the state of the light `step` steps after its episode's start: the recorded state on maps with recorded
-/// lights, else the state of its plan. After the record's end, the last state persists.
+/// Returns the state `step` steps after the episode's start, recorded or planned. The last recorded state persists.
 PICTURA_HD inline LightState light_state(const MapView& map, int light, const LightPlan& plan, int step) {
   if (map.recorded_lights.empty()) return light_state(plan, step);
   return map.recorded_lights[static_cast<size_t>(light) * static_cast<size_t>(map.recorded_steps) +
                              static_cast<size_t>(min_of(step, map.recorded_steps - 1))];
 }
 
-/// A stop line controls traffic whose heading is within 45 degrees of the line's direction. The line is extended by a
-/// tolerance at both ends. It is also extended across adjacent lanes of oncoming traffic, so that an agent cannot avoid
-/// a red light through these lanes.
+/// A stop line controls traffic within 45 degrees of its direction. It is extended by a tolerance, and across adjacent
+/// oncoming lanes, so that agents cannot avoid a red light there.
 constexpr float kStopLineCosine = 0.70710678f, kStopLineSideTolerance_m = 0.5f;
 
-/// Whether the line controls traffic that heads `forward` (a unit vector) at height z_m.
+/// Whether the line controls traffic with direction `forward` (a unit vector) at height z_m.
 PICTURA_HD inline bool holds(const StopLine& line, Vec2 forward, float z_m) {
   return dot(forward, line.direction) >= kStopLineCosine && fabsf(line.middle_m.z - z_m) < kLevel_m;
 }
 
-/// Whether a point lies sideways between the line's ends plus the side tolerance. The point is relative to the line's
-/// middle.
+/// Whether a point is between the line's ends plus the tolerance.
 PICTURA_HD inline bool is_within_ends(const StopLine& line, Vec2 from_middle_m) {
   return fabsf(cross(line.direction, from_middle_m)) <= line.half_length_m + kStopLineSideTolerance_m;
 }
 
-/// Motion of an agent in a step: the data for the test of red lights.
+/// Motion of an agent in a step.
 struct Crossing {
   Vec2 bumper_before, bumper_after;  // middle of the front bumper
-  Vec2 forward;                      // unit vector after the step
+  Vec2 forward;                      // after the step
   float z_m = 0;
   int32_t lane_before = -1, lane_after = -1;
 };
@@ -115,8 +110,7 @@ PICTURA_HD inline Span<const int32_t> successors_of(const MapView& map, int32_t 
   return map.successors.subspan(from.first_successor, from.num_all_successors);
 }
 
-/// Whether lane `to` follows lane `from`, directly or after one lane in between: an agent can pass a short lane within
-/// a step.
+/// Whether lane `to` follows `from`, directly or after one lane, which may be shorter than a step.
 PICTURA_HD inline bool follows(const MapView& map, int32_t from, int32_t to) {
   const Span<const int32_t> next = successors_of(map, from);
   for (size_t i = 0; i < next.size(); ++i) {
@@ -129,18 +123,16 @@ PICTURA_HD inline bool follows(const MapView& map, int32_t from, int32_t to) {
   return false;
 }
 
-/// Whether an agent has changed to a lane beside its lane. Moving to the next or previous lane of its route is no lane
-/// change.
+/// Whether the new lane is neither next nor previous on the agent's route.
 PICTURA_HD inline bool is_lane_change(const MapView& map, int32_t before, int32_t after) {
   return before >= 0 && after >= 0 && before != after && !follows(map, before, after) && !follows(map, after, before);
 }
 
-/// Whether the step violates stop line `light`. `state` is the light's state during the step, which the agent observed
-/// before the step. A violation requires a red light and one of two events. Either the front bumper crosses the line,
-/// or the agent, with its bumper already past the line, changes from a lane without a light to a lane of this light. An
-/// event counts only if the agent is on the line's level, its heading is within 45 degrees of the line's direction, and
-/// its bumper is within 10 m of the line's middle. It is no violation to stand on a line that turns red, to clear the
-/// junction past the line, or to enter the next lane of the route.
+/// Whether the step violates stop line `light`. `state` is the light's state during the step, observed before it. With
+/// a red light, two events violate the line: the front bumper crosses it, or an agent past it changes from a lane
+/// without a light to a lane of this light. The agent must be on the line's level, within 45 degrees of its direction,
+/// and within 10 m of its middle. An agent may stand on a line that turns red, clear the junction, and enter the next
+/// lane of its route.
 PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossing& crossing, LightState state) {
   if (state != LightState::red) return false;
   const StopLine& line = map.stop_lines[light];

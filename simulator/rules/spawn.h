@@ -1,4 +1,4 @@
-// Start of an episode or a life: an agent's class, size, conditioning, position and first goals.
+// Start of an episode or a life.
 #pragma once
 
 #include "pictura/simulator/rules/box_chains.h"
@@ -10,10 +10,9 @@
 namespace pictura {
 
 constexpr int kSpawnTries = 32;
-constexpr float kSpawnClearance_m = 0.5f;  // minimum gap between a new box and all other boxes
+constexpr float kSpawnClearance_m = 0.5f;  // minimum gap to other boxes
 constexpr float kPedestrianGoalRadius_m = 0.5f;
 
-/// Draws one coefficient from its ConditioningRange. Equal bounds make it constant.
 PICTURA_HD inline float draw_conditioning(const ConditioningRange& range, RandomStream* random_inout) {
   const float u = random_inout->uniform();
   if (!range.mixture || range.low == range.high) return range.low + (range.high - range.low) * u;
@@ -29,14 +28,13 @@ PICTURA_HD inline RandomStream agent_stream(const WorldView& world, int agent, u
                        .purpose = purpose});
 }
 
-/// Returns the random stream for goal chain `chain` of the agent's current life. The key is life_step + chain.
-/// Different lives have different keys, because a life of n steps draws fewer than n chains.
+/// Random stream of a goal chain. Keys of different lives differ, because a life of n steps draws fewer than n chains.
 PICTURA_HD inline RandomStream goal_stream(const WorldView& world, int agent, int32_t chain) {
   const int32_t life_step = world.agents.life_step[world.first_slot + agent];
   return agent_stream(world, agent, static_cast<uint32_t>(life_step) + static_cast<uint32_t>(chain), Purpose::goals);
 }
 
-/// Draws the size of an agent for the life that begins after `step` steps of the episode.
+/// Draws the size for the life that begins after `step` steps of the episode.
 PICTURA_HD inline BodySize draw_size(const WorldView& world, int agent, AgentClass agent_class, int step) {
   const ClassLimits limits = class_limits(agent_class);
   RandomStream random = agent_stream(world, agent, static_cast<uint32_t>(step), Purpose::agent_size);
@@ -47,8 +45,7 @@ PICTURA_HD inline BodySize draw_size(const WorldView& world, int agent, AgentCla
   return size;
 }
 
-/// Draws the size and the conditioning of an agent whose class and life_step are set. On maps with a record, the size
-/// is the recorded size.
+/// The class and life_step of the agent must be set. Recorded agents get their recorded size.
 PICTURA_HD inline void draw_body(const WorldView& world, int agent) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
@@ -66,14 +63,14 @@ PICTURA_HD inline void draw_body(const WorldView& world, int agent) {
     conditioning[i] = draw_conditioning(world.options.conditioning[i], &conditioning_random);
   }
   if (agent_class != AgentClass::pedestrian) return;
-  // Paper: pedestrians get only the goal and collision terms of the reward, and their goal radius has an upper bound.
+  // Paper: pedestrians get only the goal and collision rewards, and a limited goal radius.
   for (int i = static_cast<int>(Conditioning::off_road); i < kNumRewardConditioning; ++i) conditioning[i] = 0.0f;
   float& goal_radius_m = conditioning[static_cast<int>(Conditioning::delta_goal_m)];
   goal_radius_m = min_of(goal_radius_m, kPedestrianGoalRadius_m);
 }
 
-/// Resets the agent's fields and draws its class, size and conditioning. On maps with a record, class and size are
-/// those of the record. The agent is absent until place_agent() places it.
+/// Resets the fields, then sets class, size and conditioning. Class and size are drawn or, on maps with a record,
+/// recorded. The agent is absent until place_agent().
 PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
@@ -91,20 +88,18 @@ PICTURA_HD inline void draw_agent(const WorldView& world, int agent) {
   draw_body(world, agent);
 }
 
-/// Returns the box enlarged by kSpawnClearance_m on every side.
 PICTURA_HD inline AgentBox with_clearance(AgentBox box) {
   box.length_m += 2.0f * kSpawnClearance_m;
   box.width_m += 2.0f * kSpawnClearance_m;
   return box;
 }
 
-/// Returns the maximum distance between the centre of `inflated`, a result of with_clearance(), and the centre of
-/// another box that overlaps it.
+/// Maximum distance between the centres of `inflated`, a result of with_clearance(), and a box that overlaps it.
 PICTURA_HD inline float clearance_reach_m(const MapView& map, const AgentBox& inflated) {
   return radius(inflated) + map.max_box_radius_m;
 }
 
-/// Whether `other` overlaps `inflated`, a result of with_clearance().
+/// `inflated` is a result of with_clearance().
 PICTURA_HD inline bool blocks(const AgentBox& other, const MapView& map, const AgentBox& inflated) {
   const Vec2 apart = (other.center_m - inflated.center_m).xy();
   if (!other.drawn || dot(apart, apart) > square(clearance_reach_m(map, inflated))) return false;
@@ -146,7 +141,7 @@ PICTURA_HD inline LanePose pose_of(const WorldView& world, int agent, RoutePoint
   return walks(world, agent) ? pose_on_walk(world.map, at.lane, at.s_m) : pose_on_lane(world.map, at.lane, at.s_m);
 }
 
-/// Returns the next waypoint of a pedestrian. It is a random distance ahead, or farther if a parked car is there.
+/// Returns a point a random distance ahead, or farther if a parked car is there.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD RoutePoint next_walk_waypoint(const WorldView& world, int agent, RoutePoint at, RandomStream* random_inout,
                                          const ThreadGroup& group = {}) {
@@ -162,8 +157,7 @@ PICTURA_HD RoutePoint next_walk_waypoint(const WorldView& world, int agent, Rout
   return at;
 }
 
-/// Draws a new goal chain that starts at the end of the last chain. On maps with a record, an agent has only one goal,
-/// so this only marks the goal as reached.
+/// Draws a goal chain from the end of the last one. On maps with a record, marks the only goal as reached.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void draw_goal_chain(const WorldView& world, int agent, const ThreadGroup& group = {}) {
   const AgentStateView& agents = world.agents;
@@ -192,16 +186,15 @@ PICTURA_HD void draw_goal_chain(const WorldView& world, int agent, const ThreadG
   agents.goal_chains[slot] = chain + 1;
 }
 
-/// Returns the random parking spot of try `i` for parked car `car`. The map must have parking spots.
+/// Random spot of try `i`. The map must have parking spots.
 PICTURA_HD inline const ParkingSpot& parking_spot(const WorldView& world, int car, int i) {
-  constexpr int kDrawsBefore = 2;  // length and width of the car
+  constexpr int kDrawsBefore = 2;  // length and width
   RandomStream random = agent_stream(world, car, 0, Purpose::parked_cars);
   random.skip(kDrawsBefore + i);
   const Span<const ParkingSpot> spots = world.map.parking_spots;
   return spots[random.below(static_cast<int>(spots.size()))];
 }
 
-/// Returns the box of parked car `car` at `spot`.
 PICTURA_HD inline AgentBox parked_box(const WorldView& world, int car, const ParkingSpot& spot) {
   constexpr float kKerbGap_m = 0.2f;
   const ClassLimits limits = class_limits(AgentClass::vehicle);
@@ -219,7 +212,7 @@ PICTURA_HD inline AgentBox parked_box(const WorldView& world, int car, const Par
   return box;
 }
 
-/// Whether the box extends by more than kSeamTolerance_m into a driven lane (LaneSegment::is_driven) on its level.
+/// Whether the box extends by more than kSeamTolerance_m into a driven lane.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
   const OrientedBox print = footprint(box);
@@ -237,8 +230,7 @@ PICTURA_HD bool covers_driven_lane(const MapView& map, const AgentBox& box, cons
   return group.any(covers);
 }
 
-/// Whether a car may park at `spot` with this box. The box must touch no barrier and no lane on which agents drive. At
-/// a kerb, its centre must be off the road.
+/// The box must touch no barrier and no driven lane. At a kerb, its centre must be off the road.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool may_park(const MapView& map, const AgentBox& box, const ParkingSpot& spot,
                          const ThreadGroup& group = {}) {
@@ -247,8 +239,7 @@ PICTURA_HD bool may_park(const MapView& map, const AgentBox& box, const ParkingS
          !(is_at_kerb && is_on_road(map, box.center_m.xy(), box.center_m.z, group));
 }
 
-/// Parks car `car` at the spot of try `i`. If i is -1, the car has found no place: its box is neither drawn nor part of
-/// collisions.
+/// Parks a car at the spot of try `i`. If i is -1, its box is not drawn and does not collide.
 PICTURA_HD inline void put_parked_car(const WorldView& world, int car, int i) {
   AgentBox box = parked_box(world, car, i < 0 ? ParkingSpot{} : parking_spot(world, car, i));
   box.drawn = i >= 0;
@@ -256,8 +247,7 @@ PICTURA_HD inline void put_parked_car(const WorldView& world, int car, int i) {
   world.boxes[world.num_agents + car] = world.boxes_before[world.num_agents + car] = box;
 }
 
-/// Draws a point uniformly on a sequence of lanes. end_m is the running sum of their lengths; the `lane` of the result
-/// is an index into end_m.
+/// Draws a point uniformly on lanes with running lengths end_m. `lane` of the result is an index into end_m.
 PICTURA_HD inline RoutePoint draw_place(Span<const float> end_m, RandomStream* random_inout) {
   const float at_m = random_inout->uniform(0.0f, end_m[end_m.size() - 1]);
   size_t low = 0, high = end_m.size() - 1;
@@ -272,15 +262,14 @@ PICTURA_HD inline RoutePoint draw_place(Span<const float> end_m, RandomStream* r
   return {static_cast<int32_t>(low), at_m - (low == 0 ? 0.0f : end_m[low - 1])};
 }
 
-/// Whether the map has places where the agent could spawn. The result is false on maps with a record, whose agents need
-/// none.
+/// Whether the agent could spawn on the map. Recorded agents need no places.
 PICTURA_HD inline bool has_places(const WorldView& world, int agent) {
   if (has_record(world.map)) return false;
   return walks(world, agent) ? !world.map.walk_pieces.empty() : !world.map.spawn_lanes.empty();
 }
 
-/// Returns the random point of try `i` of an agent. Points are uniformly distributed over the spawn lanes or, for
-/// pedestrians, over all walkways in both directions. The map must have such places.
+/// Random point of try `i`, uniformly on the spawn lanes or, for pedestrians, on all walkways in both directions. The
+/// map must have such lanes or walkways.
 PICTURA_HD inline RoutePoint spawn_point(const WorldView& world, int agent, int i) {
   RandomStream random = agent_stream(world, agent, 0, Purpose::spawn);
   random.skip(i);
@@ -290,22 +279,20 @@ PICTURA_HD inline RoutePoint spawn_point(const WorldView& world, int agent, int 
   return at;
 }
 
-/// Returns the agent's box at the point of try `i`, aligned with the lane or walkway.
+/// Box at the point of try `i`.
 PICTURA_HD inline AgentBox spawn_box(const WorldView& world, int agent, int i) {
   const LanePose pose = pose_of(world, agent, spawn_point(world, agent, i));
   return box_at(world.agents, world.first_slot + agent, pose.position_m, sincos_of(pose.heading_rad));
 }
 
-/// Whether the map permits an agent's box: it must touch no barrier and have its centre on the road. A pedestrian's box
-/// has only one condition: it must touch no wall.
+/// A box must touch no barrier and have its centre on the road. A pedestrian's box must only touch no wall.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool fits_map(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
   if (box.agent_class == AgentClass::pedestrian) return !touches_wall(map, box, group);
   return !touches_barrier(map, box, group) && is_on_road(map, box.center_m.xy(), box.center_m.z, group);
 }
 
-/// Whether the reference point of a vehicle or cyclist is before a stop line and its front bumper is past the line.
-/// Only lines that control the agent's direction are tested.
+/// Whether a stop line for the box's direction is between its reference point and its front bumper.
 PICTURA_HD inline bool straddles_stop_line(const MapView& map, const AgentBox& box) {
   const Vec2 forward{box.cos_heading, box.sin_heading};
   const Vec2 bumper = front_bumper(box);
@@ -322,28 +309,28 @@ PICTURA_HD inline bool straddles_stop_line(const MapView& map, const AgentBox& b
   return false;
 }
 
-/// Whether an agent may start its episode with this box. Agents never start on a stop line, regardless of its light,
-/// because driving on from there would not count as crossing the line.
+/// Whether an agent may start with this box. Agents never start on a stop line, because driving on would not count as
+/// crossing it.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool may_spawn(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
   return fits_map(map, box, group) && (box.agent_class == AgentClass::pedestrian || !straddles_stop_line(map, box));
 }
 
-/// Whether the agent takes part in the episode. `i` is the try at which it found a place, or -1. On maps with a record,
-/// all agents take part; if some tracks are replayed, only agents present at the start do.
+/// `i` is the try at which the agent found a place, or -1. On maps with a record, all agents join; with replayed
+/// tracks, only agents present at the start do.
 PICTURA_HD inline bool joins_episode(const WorldView& world, int agent, int i) {
   if (has_replayed_tracks(world.map)) return has_body(world.agents.status[world.first_slot + agent]);
   return i >= 0 || has_record(world.map);
 }
 
-/// Places the agent at `at` with a speed along the route, and draws its first goal chain.
+/// Places the agent with a speed along the route, and draws its first goal chain.
 template <typename ThreadGroup>
 PICTURA_HD void put_on_route(const WorldView& world, int agent, RoutePoint at, float speed_mps,
                              const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
   const int slot = world.first_slot + agent;
   const LanePose pose = pose_of(world, agent, at);
-  // `at` of a pedestrian is on a walkway, so the pedestrian has no lane yet.
+  // A pedestrian has no lane yet.
   const int32_t own_lane = walks(world, agent) ? -1 : at.lane;
   const LaneFit fit =
       fit_agent(world, agent, pose.position_m.xy(), pose.position_m.z, pose.heading_rad, own_lane, group);
@@ -364,8 +351,8 @@ PICTURA_HD void put_on_route(const WorldView& world, int agent, RoutePoint at, f
   draw_goal_chain(world, agent, group);
 }
 
-/// Places the agent at the point of try `i`, at rest, and draws its first goal chain. If i is -1, the agent stays
-/// absent. On maps with a record, the agent is placed at the start of its record.
+/// Places the agent at rest at the point of try `i`, or at the start of its record. If i is -1, an agent without a
+/// record stays absent.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void place_agent(const WorldView& world, int agent, int i, const ThreadGroup& group = {}) {
   const AgentStateView& agents = world.agents;

@@ -1,6 +1,5 @@
-// One step of one agent, in three phases: (1) advance: motion, road, lights and goals; (2) collisions with all boxes;
-// (3) reward and halt. All agents of a world finish phase 1 before any agent begins phase 2; phases 2 and 3 need no
-// such order.
+// One step of an agent, in three phases: (1) motion, road, lights and goals; (2) collisions; (3) reward and halt. All
+// agents of a world finish phase 1 before any agent begins phase 2.
 #pragma once
 
 #include "pictura/simulator/command.h"
@@ -19,7 +18,7 @@ PICTURA_HD inline bool takes_actions(const WorldView& world, int agent) {
   return takes_actions(world.agents.status[world.first_slot + agent]);
 }
 
-/// Whether the agent left the map at the end of a road in the last step.
+/// Whether the agent left an open map in the last step.
 PICTURA_HD inline bool has_left(const WorldView& world, int agent) {
   return world.map.is_open && world.agents.left[world.first_slot + agent] != 0;
 }
@@ -41,8 +40,7 @@ PICTURA_HD inline Vec3 waypoint_of(const AgentStateView& agents, int slot, int i
   return {agents.waypoint_x_m[i], agents.waypoint_y_m[i], agents.waypoint_z_m[i]};
 }
 
-/// Additional event bit of a step: the agent leaves the map. The field `left` stores it, because `events` has only 8
-/// bits.
+/// Additional event bit, stored in the field `left`, because `events` has only 8 bits.
 constexpr int kLeaves = 256;
 
 /// Whether the agent's route ends at its last waypoint.
@@ -52,10 +50,10 @@ PICTURA_HD inline bool ends_way(const WorldView& world, int agent) {
          is_at_route_end(world.map, {world.agents.goal_lane[slot], world.agents.goal_lane_s_m[slot]});
 }
 
-/// Tests whether the motion from `from` to `to` passes waypoints; returns event bits. A chain's last waypoint becomes
-/// the goal of the metric Goals when it becomes the next waypoint. It remains the goal until it is passed within
-/// kMetricGoalRadius_m, or until the next chain's last waypoint replaces it. So an agent can still reach it after
-/// passing it at the larger distance that the reward accepts.
+/// Returns the event bits of waypoints that the motion passes. A chain's last waypoint becomes the goal of the metric
+/// Goals when it becomes the next waypoint. It remains the goal until the agent passes it within kMetricGoalRadius_m,
+/// or until the next chain's last waypoint replaces it. The reward may accept a larger distance, so the agent can reach
+/// the goal after the waypoint.
 template <typename ThreadGroup>
 PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3 to, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;
@@ -93,7 +91,6 @@ PICTURA_HD int pass_waypoints(const WorldView& world, int agent, Vec3 from, Vec3
   return events | kEventWaypoint;
 }
 
-/// Returns the parameters of an agent's dynamics.
 PICTURA_HD inline DynamicsParameters dynamics_of(const WorldView& world, int slot) {
   const AgentStateView& agents = world.agents;
   const float* conditioning = agents.conditioning + slot * kNumConditioning;
@@ -106,7 +103,7 @@ PICTURA_HD inline DynamicsParameters dynamics_of(const WorldView& world, int slo
   return parameters;
 }
 
-/// Whether a command to an agent is valid; see command.h.
+/// See command.h.
 PICTURA_HD inline bool is_valid(int32_t action) { return action >= 0 && action < kNumActions; }
 PICTURA_HD inline bool is_valid(const Command& command) {
   switch (command.kind) {
@@ -128,14 +125,11 @@ PICTURA_HD inline bool is_follow_record_command(const Command& command) {
   return command.kind == CommandKind::recorded;
 }
 
-/// Whether a command to follow the record has an effect: the map must have a record, and the agent must not have
-/// halted.
 PICTURA_HD inline bool may_follow_record(const WorldView& world, int agent) {
   return has_record(world.map) && world.agents.status[world.first_slot + agent] != AgentStatus::halted;
 }
 
-/// Returns the motion of an agent after a step with this command. *z_m_inout is the height near which the road is
-/// searched; a kinematic_state command replaces it.
+/// *z_m_inout is the height near which the road is searched; a kinematic_state command replaces it.
 PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, int32_t action, float*) {
   const int slot = world.first_slot + agent;
   const Motion from = motion_of(world.agents, slot);
@@ -143,7 +137,7 @@ PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, int
   DynamicsParameters parameters = dynamics_of(world, slot);
   if (active_impairment(world, agent) == Impairment::phantom_braking) {
     controls.jerk_long_mps3 = braking_jerk_mps3(from);
-    parameters.rules.reset_at_standstill = true;  // otherwise braking would make it reverse
+    parameters.rules.reset_at_standstill = true;  // otherwise the agent would reverse
   }
   return move(from, controls, parameters, class_limits(world.agents.agent_class[slot]), world.options.dt_s);
 }
@@ -158,8 +152,8 @@ PICTURA_HD inline Motion commanded_motion(const WorldView& world, int agent, con
   return motion;
 }
 
-/// Phase 1 of step `step` of the episode, counted from 1: moves an agent by an action or a Command, and evaluates the
-/// road at its new position. Only the first thread of the group writes, after all threads have read.
+/// Phase 1 of step `step` of the episode, counted from 1. Only the first thread of the group writes, after all threads
+/// have read.
 template <typename CommandType, typename ThreadGroup = SingleThread>
 PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& command, int step,
                         const ThreadGroup& group = {}) {
@@ -173,7 +167,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   if (!takes_actions(world, agent)) {
     if (group.rank() > 0) return;
     if (world.map.is_open) agents.left[slot] = 0;
-    // The box of an agent that left in the last step has remained visible until now.
+    // The box of an agent that left in the last step is still visible.
     const bool is_gone = !has_body(agents.status[slot]) && before.drawn;
     if (is_gone) return remove_box(world, agent);
     world.boxes_before[agent] = before;
@@ -220,8 +214,7 @@ PICTURA_HD void advance(const WorldView& world, int agent, const CommandType& co
   if (world.map.is_open) agents.left[slot] = (events & kLeaves) != 0;
 }
 
-/// Phase 2: finds the collisions of an active agent with all other boxes, including those of halted agents and parked
-/// cars.
+/// Phase 2 of an active agent.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void find_collisions(const WorldView& world, int agent, const ThreadGroup& group = {}) {
   if (!is_active(world, agent)) return;
@@ -251,7 +244,7 @@ PICTURA_HD void find_collisions(const WorldView& world, int agent, const ThreadG
   events = static_cast<uint8_t>(events | kEventCollision | (is_at_fault ? kEventAtFault : kEventNone));
 }
 
-/// Converts a step's event bits for the reward. `motion` is the motion before an infraction halts the agent.
+/// `motion` is the motion before an infraction halts the agent.
 PICTURA_HD inline StepFacts step_facts(const Motion& motion, const LaneFit& fit, int events) {
   StepFacts facts;
   facts.motion = motion;
@@ -264,10 +257,9 @@ PICTURA_HD inline StepFacts step_facts(const Motion& motion, const LaneFit& fit,
   return facts;
 }
 
-/// Phase 3: computes the reward of an active agent and returns its terms. After an infraction, the agent halts, leaves
-/// or drives on, as options.after_infraction says; it also leaves at its goal (options.leave_at_goal) or where its road
-/// ends. An agent that leaves becomes absent or waiting; its box remains visible until the next step, but takes no part
-/// in that step's collisions. Phase 2 of other agents reads no data that this phase writes.
+/// Phase 3 of an active agent: applies options.after_infraction and returns the reward terms. The agent also leaves at
+/// its goal (options.leave_at_goal) or where its road ends. Its box then remains visible until the next step, but takes
+/// no part in that step's collisions. Phase 2 of other agents reads no data that this phase writes.
 PICTURA_HD inline RewardTerms apply_reward_and_halt(const WorldView& world, int agent) {
   if (!is_active(world, agent)) return {};
   const AgentStateView& agents = world.agents;

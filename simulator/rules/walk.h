@@ -1,4 +1,4 @@
-// Routes of pedestrians along pieces of walkways. At a dead end, a route turns back.
+// Routes of pedestrians along walkways. At a dead end, a route turns back.
 #pragma once
 
 #include "pictura/common/rng.h"
@@ -6,7 +6,7 @@
 
 namespace pictura {
 
-/// Returns the pose at distance s_m from the start of a piece; its heading is the piece's direction.
+/// s_m is the distance from the start of the piece.
 PICTURA_HD inline LanePose pose_on_walk(const MapView& map, int32_t piece_index, float s_m) {
   const WalkPiece& piece = map.walk_pieces[piece_index];
   const float along = clamp(s_m, 0.0f, piece.length_m);
@@ -14,8 +14,8 @@ PICTURA_HD inline LanePose pose_on_walk(const MapView& map, int32_t piece_index,
   return {{xy.x, xy.y, height_on(piece, along)}, piece.heading_rad};
 }
 
-/// Returns the piece that follows a piece on a random route. All pieces that leave its end, except the way back, are
-/// equally likely. At a dead end, returns the way back.
+/// Returns the next piece of a random route. All pieces that leave its end, except the way back, are equally likely. At
+/// a dead end, returns the way back.
 PICTURA_HD inline int32_t choose_way(const MapView& map, int32_t piece_index, RandomStream* random_inout) {
   const WalkPiece& piece = map.walk_pieces[piece_index];
   if (piece.next >= 0) return piece.next;
@@ -30,10 +30,10 @@ PICTURA_HD inline int32_t choose_way(const MapView& map, int32_t piece_index, Ra
   return back;
 }
 
-/// Returns the point distance_m ahead of `at` on a random route along walkways.
+/// Point distance_m ahead on a random route.
 PICTURA_HD inline RoutePoint advance_along_walkway(const MapView& map, RoutePoint at, float distance_m,
                                                    RandomStream* random_inout) {
-  constexpr int kMaxPiecesWalked = 1024;  // a safety bound, for many pieces of a few centimetres
+  constexpr int kMaxPiecesWalked = 1024;  // a safety bound
   for (int i = 0; i < kMaxPiecesWalked; ++i) {
     const WalkPiece& piece = map.walk_pieces[at.lane];
     const float left_m = piece.length_m - at.s_m;
@@ -44,8 +44,8 @@ PICTURA_HD inline RoutePoint advance_along_walkway(const MapView& map, RoutePoin
   return {at.lane, 0.0f};
 }
 
-/// Variant of fit_lane() for pedestrians. A pedestrian gets the height of the nearest walkway on its level within
-/// kWalkReach_m, unless its lane is nearer. The other results are those of fit_lane().
+/// Variant of fit_lane() for pedestrians. The height is that of the nearest walkway within kWalkReach_m, unless a lane
+/// is nearer.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD LaneFit fit_walk(const MapView& map, Vec2 p, float z_m, float heading_rad, int32_t current_lane,
                             const ThreadGroup& group = {}) {

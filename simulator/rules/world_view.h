@@ -1,5 +1,4 @@
-// One world as the rules see it: pointers to its map, agents, lights and configuration, in host or device memory. The
-// executor owns this memory.
+// One world as the rules see it, in host or device memory of the executor.
 #pragma once
 
 #include "pictura/common/scene_types.h"
@@ -26,29 +25,29 @@ struct RuleOptions {
   DynamicsRules dynamics{};
   OtherShares others{};
   bool auxiliary_observations = true;
-  ConditioningRange conditioning[kNumConditioning] = {};        // ranges from which coefficients are drawn
-  ConditioningRange conditioning_scale[kNumConditioning] = {};  // ranges that the policy observes as [-1, 1]
+  ConditioningRange conditioning[kNumConditioning] = {};        // ranges for draws
+  ConditioningRange conditioning_scale[kNumConditioning] = {};  // ranges observed as [-1, 1]
 };
 
 struct WorldView {
   const MapView& map;
   const RuleOptions& options;
-  int index = 0;  // index among the simulator's worlds
+  int index = 0;  // among the simulator's worlds
   uint64_t seed = 0;
   uint32_t global_world = 0;
   uint32_t episode = 0;
-  int step = 0;                      // number of steps taken in the episode
-  AgentStateView agents{};           // state of all worlds, indexed by slot
-  int first_slot = 0;                // first slot of this world
-  int num_agents = 0;                // number of controlled agents
-  int first_box = 0;                 // first box of this world in the scene
-  int num_boxes = 0;                 // number of controlled agents and parked cars
-  AgentBox* boxes = nullptr;         // [num_boxes] this world's part of the scene: controlled agents, then parked cars
-  AgentBox* boxes_before = nullptr;  // [num_boxes] the boxes before the step
-  GridView box_cells;                // indices of visible boxes, by the cell of their centres
-  Vec2* cell_centers = nullptr;      // [num_boxes] centres of the boxes of box_cells.items, in that order
+  int step = 0;             // steps taken in the episode
+  AgentStateView agents{};  // [slots of all worlds]
+  int first_slot = 0;
+  int num_agents = 0;  // controlled agents
+  int first_box = 0;   // in the scene
+  int num_boxes = 0;
+  AgentBox* boxes = nullptr;         // [num_boxes] controlled agents, then parked cars
+  AgentBox* boxes_before = nullptr;  // [num_boxes] before the step
+  GridView box_cells;                // visible boxes by the cell of their centres
+  Vec2* cell_centers = nullptr;      // [num_boxes] in the order of box_cells.items
   LightPlan* light_plans = nullptr;  // [stop lines]
-  LightState* lights = nullptr;      // [stop lines] states during the step; agents observe them before the step
+  LightState* lights = nullptr;      // [stop lines] during the step; observed before it
 };
 
 PICTURA_HD inline Motion motion_of(const AgentStateView& agents, int slot) {
@@ -63,7 +62,7 @@ PICTURA_HD inline Motion motion_of(const AgentStateView& agents, int slot) {
           .jerk_lat_mps3 = agents.jerk_lat_mps3[slot]};
 }
 
-/// Stores a motion. `heading` must be sincos_of(motion.heading_rad).
+/// `heading` must be sincos_of(motion.heading_rad).
 PICTURA_HD inline void store_motion(const AgentStateView& agents, int slot, const Motion& motion, SinCos heading) {
   agents.x_m[slot] = motion.x_m;
   agents.y_m[slot] = motion.y_m;
@@ -99,7 +98,6 @@ struct BodySize {
   float length_m = 0, width_m = 0, height_m = 0;
 };
 
-/// Returns a box of this class and size with its reference point at `position_m`.
 PICTURA_HD inline AgentBox box_at(AgentClass agent_class, const BodySize& size, Vec3 position_m, SinCos heading) {
   const float ahead = reference_to_center(agent_class, size.length_m);
   AgentBox box;
@@ -113,7 +111,6 @@ PICTURA_HD inline AgentBox box_at(AgentClass agent_class, const BodySize& size, 
   return box;
 }
 
-/// Returns a box with the class and size of the agent in `slot`.
 PICTURA_HD inline AgentBox box_at(const AgentStateView& agents, int slot, Vec3 position_m, SinCos heading) {
   const BodySize size{agents.length_m[slot], agents.width_m[slot], agents.height_m[slot]};
   return box_at(agents.agent_class[slot], size, position_m, heading);
@@ -121,7 +118,7 @@ PICTURA_HD inline AgentBox box_at(const AgentStateView& agents, int slot, Vec3 p
 
 constexpr uint8_t kHaltedPalette = 1;
 
-/// Returns the agent's box in the scene. The box of an agent without a body is neither drawn nor part of collisions.
+/// A box without a body is neither drawn nor part of collisions.
 PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
   const AgentStatus status = agents.status[slot];
   AgentBox box = box_at(agents, slot, {agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]},
@@ -131,13 +128,13 @@ PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
   return box;
 }
 
-/// Returns the agent's driver kind in this episode, see draw_driver_kind().
+/// See draw_driver_kind().
 PICTURA_HD inline int driver_kind_of(const WorldView& world, int agent) {
   return draw_driver_kind(world.options.others, world.seed, world.global_world, static_cast<uint32_t>(agent),
                           world.episode);
 }
 
-/// Returns the agent's impairment if it is active at this step, else `none`.
+/// Returns `none` if the impairment is not active at this step.
 PICTURA_HD inline Impairment active_impairment(const WorldView& world, int agent) {
   const Impairment impairment = impairment_of(driver_kind_of(world, agent));
   const bool shows = is_active_at(impairment, world.step, world.options.dt_s, world.seed, world.global_world,
@@ -145,13 +142,11 @@ PICTURA_HD inline Impairment active_impairment(const WorldView& world, int agent
   return shows ? impairment : Impairment::none;
 }
 
-/// Returns the objects that are hidden from the agent at this step.
 PICTURA_HD inline Hides hidden_from(const WorldView& world, int agent) {
   return hidden_by(active_impairment(world, agent));
 }
 
-/// Returns the view of the agent's cameras. For absent agents, see Simulator::views(). `hidden` must be the result of
-/// hidden_from().
+/// `hidden` must be the result of hidden_from(). For absent agents, see Simulator::views().
 PICTURA_HD inline View view_of(const WorldView& world, int agent, Hides hidden) {
   View view;
   view.world = world.index;

@@ -1,4 +1,4 @@
-// Selection of the nearest of many items. It computes eight distances at a time.
+// Selection of the nearest of many items, with eight distances at a time.
 #pragma once
 
 #include "pictura/common/math.h"
@@ -7,8 +7,8 @@
 
 namespace pictura {
 
-/// Keeps the `capacity` nearest of all added items, in ascending order of squared distance, then of item. Items must
-/// not be negative. Insertion has no branches, because processors cannot predict the position of an item in the order.
+/// Keeps the `capacity` nearest items, ordered by squared distance, then by item. Items must not be negative. Insertion
+/// has no branches, because they would be hard to predict.
 template <int capacity>
 class NearestOfOneThread {
  public:
@@ -16,10 +16,10 @@ class NearestOfOneThread {
     keys_.insert(is_one ? key_of(distance2, item) : Keys::kNone);
     count_ += is_one;
   }
-  /// Adds the items whose squared distance from a point is less than below2, except item `except`.
+  /// Adds the items whose squared distance is less than below2, except item `except`.
   PICTURA_HD void offer_all(const Vec2* places, const int32_t* items, int num_items, int32_t except, Vec2 from,
                             float below2) {
-    // A buffer first collects the near items, without branches, because it is hard to predict whether an item is near.
+    // Collects near items first, also without branches.
     float near_distance2[kGathered + 8];
     int32_t near_items[kGathered + 8];
     int num_near = 0;
@@ -34,8 +34,7 @@ class NearestOfOneThread {
       load_pairs(&eight_places->x, &x, &y);
       float distance2[8];
       const Float8 apart_x = x - from.x, apart_y = y - from.y;
-      const Float8 distances2 = apart_x * apart_x + apart_y * apart_y;  // with the same bits as dot() of a vector with
-                                                                        // itself
+      const Float8 distances2 = apart_x * apart_x + apart_y * apart_y;  // same bits as dot()
       store8(distances2, distance2);
       const uint32_t chosen = these & bits_of(distances2 < below2) & ~equal8(eight_items, except);
       copy_chosen(distance2, chosen, near_distance2 + num_near);
@@ -58,7 +57,7 @@ class NearestOfOneThread {
     }
     insert_near();
   }
-  /// Finishes the selection: call it after the last item is added and before the functions below.
+  /// Must be called after the last item is added and before the functions below.
   PICTURA_HD void settle() {
     int64_t keys[Keys::kCount];
     keys_.store(keys);

@@ -1,4 +1,4 @@
-// Rows of entity sets, computed eight floats at a time: they are transformed to the ego frame, then scaled.
+// Rows of entity sets, eight floats at a time.
 #pragma once
 
 #include "pictura/common/portable/float8.h"
@@ -8,8 +8,7 @@
 
 namespace pictura {
 
-/// Transforms eight floats to the ego frame. The floats contain a position (floats 0, 1, 2) and a direction (4, 5), or
-/// two positions (0, 1, 2 and 4, 5, 6).
+/// Transforms a position (floats 0, 1, 2) and a direction (4, 5), or two positions (0, 1, 2 and 4, 5, 6).
 struct RowFrame {
   Float8 minus_origin, cos, sin;
 
@@ -23,7 +22,7 @@ struct RowFrame {
   }
 
  private:
-  // Unused floats of minus_origin are -0, because x + -0 is x for every x, even for -0.
+  // Unused floats are -0, because x + -0 is x for every x.
   PICTURA_HD RowFrame(const EgoFrame& frame, Vec3 second_origin_m)
       : minus_origin(set8(-frame.origin_m.x, -frame.origin_m.y, -frame.origin_m.z, -0.0f, -second_origin_m.x,
                           -second_origin_m.y, -second_origin_m.z, -0.0f)),
@@ -32,17 +31,16 @@ struct RowFrame {
 };
 
 #ifdef offsetof  // undefined under NVRTC
-// These members are read as eight consecutive floats.
+// Read as eight consecutive floats.
 static_assert(offsetof(AgentBox, cos_heading) == 3 * sizeof(float) &&
               offsetof(AgentBox, height_m) == 7 * sizeof(float));
 static_assert(offsetof(StopLine, right_m) == 3 * sizeof(float) && sizeof(StopLine) >= 8 * sizeof(float));
 #endif
 
-// Functions without a Float8 parameter do not return a Float8. A program may contain code for two different types
-// Float8, and a function's mangled name contains the types of its parameters, but not its return type. The linker could
-// not tell apart functions that differ only in the type Float8 that they return.
+// Functions without a Float8 parameter do not return a Float8. Mangled names contain no return types, and a program may
+// contain two types Float8.
 
-/// Writes the row of a partner (one of the nearest boxes; docs/reference/observation.md).
+/// Writes the row of one of the nearest boxes.
 PICTURA_HD inline void write_partner(const AgentBox& box, float speed_mps, const RowFrame& frame, float* row_out) {
   // x, y, z, length, cos, sin, width, height
   const Float8 turnable = permute<0, 1, 2, 5, 3, 4, 6, 7>(load8(&box.center_m.x));
@@ -61,11 +59,10 @@ PICTURA_HD inline void write_piece(const ObservedPiece& piece, const RowFrame& f
 }
 static_assert(kLaneFeatures == 7 && kBoundaryFeatures == 7 && kWallFeatures == 7);
 
-/// Writes the rows of the `count` pieces with indices `chosen` into a set of `capacity` rows.
+/// Writes the pieces with indices `chosen` into a set of `capacity` rows.
 PICTURA_HD inline void write_pieces(Span<const ObservedPiece> pieces, const int32_t* chosen, int count, int capacity,
                                     const RowFrame& frame, float* rows_out) {
-  // write_piece() writes a zero behind the row. The next row overwrites it, but behind the set's last row there is no
-  // room.
+  // write_piece() writes a zero behind the row, where the set's last row has no room.
   const int num_followed = min_of(count, capacity - 1);
   for (int i = 0; i < num_followed; ++i, rows_out += kLaneFeatures) {
     write_piece(pieces[chosen[i]], frame, rows_out);
@@ -77,12 +74,11 @@ PICTURA_HD inline void write_pieces(Span<const ObservedPiece> pieces, const int3
   }
 }
 
-/// The ends of a stop line in the ego frame.
 struct LocalEnds {
   Vec3 left_m, right_m;
 };
 
-/// Returns the ends of a stop line. `frame` must come from RowFrame::of_two_places().
+/// Ends in the ego frame. `frame` must come from RowFrame::of_two_places().
 PICTURA_HD inline LocalEnds ends_of(const StopLine& line, const RowFrame& frame) {
   float ends[8];
   store8(frame.to_local(permute<0, 1, 2, 6, 3, 4, 5, 7>(load8(&line.left_m.x))), ends);

@@ -1,4 +1,4 @@
-// Variant of is_in_sight() that tests eight pieces at a time.
+// Variant of is_in_sight() for eight pieces at a time.
 #pragma once
 
 #include "pictura/common/portable/float8.h"
@@ -7,11 +7,11 @@
 
 namespace pictura {
 
-/// Maximum number of items that find_pieces_in_sight() writes beyond `capacity`.
+/// Maximum number of items beyond `capacity`.
 constexpr int kFoundBeyond = 8;
 
-/// Writes those of `items` that are in sight, in their order, and returns their number. Stops when at least `capacity`
-/// items are found. found_out must have room for capacity + kFoundBeyond items.
+/// Writes the visible `items` in order, and returns their number. Stops when at least `capacity` are found. found_out
+/// must have room for capacity + kFoundBeyond items.
 PICTURA_HD inline int find_pieces_in_sight(Span<const Vec2> middles, Span<const int32_t> items, const EgoFrame& frame,
                                            int capacity, int32_t* found_out) {
   const Float8 minus_origin_x = -frame.origin_m.x, minus_origin_y = -frame.origin_m.y;
