@@ -1,4 +1,4 @@
-// Storage of all agents' fields (see fields.h) in host memory.
+// All agents' fields (fields.h) in host memory.
 #pragma once
 
 #include <vector>
@@ -13,18 +13,16 @@ struct AgentState {
   PICTURA_AGENT_FIELDS(X)
 #undef X
 
-  /// Initializes every field of num_agents agents.
+  /// Sets initial values.
   explicit AgentState(size_t num_agents = 0) { resize(num_agents); }
   void resize(size_t num_agents);
   void reserve(size_t num_agents);
   AgentStateView view();
-  /// Hashes the bytes of every field, in the order of fields.h. In this and the following functions, `with_lives`
-  /// includes the fields of lives.
+  /// In the following functions, `with_lives` includes the fields of lives. Bytes are in the order of fields.h.
   void add_to(Hash64* hash_inout, bool with_lives) const;
   size_t size_bytes(bool with_lives) const;
-  /// Writes the bytes of every field, in the order of fields.h: size_bytes() bytes.
   void copy_to(uint8_t* bytes_out, bool with_lives) const;
-  /// Reads bytes that copy_to() wrote for the same number of agents; `bytes` must hold at least size_bytes() bytes.
+  /// Reads bytes that copy_to() wrote for the same number of agents.
   void assign_from(const uint8_t* bytes, bool with_lives);
 };
 

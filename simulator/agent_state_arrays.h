@@ -1,4 +1,4 @@
-// Fields of agents by name, type and shape, generated from the list in fields.h.
+// Fields of agents by name, type and shape.
 #pragma once
 
 #include <string_view>
@@ -17,14 +17,14 @@ struct AgentFieldInfo {
   std::string_view comment;
 };
 
-/// All fields, in the order of AgentField.
+/// In the order of AgentField.
 constexpr AgentFieldInfo kAgentFields[] = {
 #define X(name, type, per_agent, first, comment) {#name, element_type<type>(), per_agent, comment},
     PICTURA_AGENT_FIELDS(X)
 #undef X
 };
 
-/// Whether the simulator computes a field from other fields. Simulator::set_state refuses such a field.
+/// Whether the simulator computes a field from others. Simulator::set_state refuses such a field.
 constexpr bool is_derived(AgentField field) {
   switch (field) {
     case AgentField::cos_heading:
@@ -41,15 +41,13 @@ constexpr bool is_derived(AgentField field) {
   }
 }
 
-/// Returns all fields as arrays of shape [slots] or, for fields with several values per agent, [slots, per agent].
+/// Returns all fields as arrays [slots] or [slots, per agent].
 std::vector<NamedArray> agent_state_arrays(const AgentStateView& state, int num_slots, Device device);
 
-/// Returns the edit that these arrays describe. Checks the arrays, but not their values: throws Error as
-/// Simulator::set_state does.
+/// Returns the edit that these arrays describe. Throws Error as Simulator::set_state does, but does not check values.
 StateEdit state_edit(const Array& slots, Span<const NamedArray> fields, int num_slots, Device device);
 
-/// Formats the values of a field in one slot: "3", or "[1, 2, 3]" for several values. The fields must be in host
-/// memory.
+/// Formats values in host memory: "3", or "[1, 2, 3]" for several values.
 std::string field_text(const AgentStateView& agents, int slot, AgentField field);
 
 }  // namespace pictura

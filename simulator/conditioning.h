@@ -1,5 +1,4 @@
-// The 17 coefficients that weight each agent's reward and scale its dynamics: their order, their names and their
-// training distributions (paper, table of the conditioning coefficients).
+// The 17 coefficients of each agent's reward and dynamics (paper, table of the conditioning coefficients).
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -28,13 +27,12 @@ enum class Conditioning : int32_t {
 constexpr int kNumConditioning = 17;
 constexpr int kNumRewardConditioning = 14;
 
-/// Distribution U(low, high) or, if `mixture`, U(low, 1) or U(1, high) with equal probability.
+/// U(low, high) or, if `mixture`, U(low, 1) or U(1, high) with equal probability.
 struct ConditioningRange {
   float low, high;
   bool mixture;
 };
 
-/// Training distributions of the paper, in the order of Conditioning.
 constexpr ConditioningRange kPaperConditioning[kNumConditioning] = {
     {2.0f, 12.0f, false},      {0.0f, 20.0f, false},      {0.0f, 3.0f, false},       {0.0f, 3.0f, false},
     {0.0f, 1.0f, false},       {0.0f, 0.1f, false},       {2.5e-4f, 2.5e-2f, false}, {0.0f, 1.0f, false},

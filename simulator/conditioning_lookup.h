@@ -1,4 +1,4 @@
-// Lookup of conditioning coefficients by name, for configurations, commands and callers from other languages.
+// Lookup of conditioning coefficients by name.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,8 @@ namespace pictura {
 /// Maximum absolute value of a coefficient.
 constexpr double kMaxConditioning = 1e6;
 
-/// Returns the index of a coefficient in the order of Conditioning. Throws UsageError for an unknown name. The message
-/// begins with `where`, such as "--conditioning", and suggests the nearest name.
+/// Returns the index of a coefficient in Conditioning. Throws UsageError for an unknown name. The message begins with
+/// `where` and suggests the nearest name.
 std::size_t conditioning_index(std::string_view name, const std::string& where);
 
 }  // namespace pictura

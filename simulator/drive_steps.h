@@ -1,4 +1,4 @@
-// Main loop that drives a simulator: in each pass it checks for ^C, gets commands and takes a step.
+// Main loop that drives a simulator.
 #pragma once
 
 #include <functional>
@@ -11,16 +11,16 @@ namespace pictura {
 
 /// Result of drive_steps().
 struct DriveEnd {
-  int steps = 0;  // number of steps taken
+  int steps = 0;
   bool is_interrupted = false;
 };
 
-/// Takes at most `steps` steps. Before each step, act(step) writes `commands` [slots]; step_observed() takes the step;
-/// then on_step(step, result) is called. Ends early on ^C, or if act() returns false.
+/// Takes at most `steps` steps. Before each step, act(step) writes `commands` [slots]; after it, on_step(step, result)
+/// is called. Ends early on ^C, or if act() returns false.
 DriveEnd drive_steps(Simulator& simulator, Span<Command> commands, int steps, const std::function<bool(int)>& act,
                      const std::vector<StepObserver*>& observers = {},
                      const std::function<void(int, const StepResult&)>& on_step = {});
-/// Variant in which a controller writes the commands of all agents. The simulator must work in host memory.
+/// Variant with a controller of all agents. The simulator must work in host memory.
 DriveEnd drive_steps(Simulator& simulator, Controller& controller, int steps,
                      const std::vector<StepObserver*>& observers = {},
                      const std::function<void(int, const StepResult&)>& on_step = {});

@@ -1,6 +1,5 @@
-// List of all fields of an agent's state: name, type, initial value and description. Each field is one array over all
-// agents (structure of arrays). Allocation, reset, hashing, comparison, checkpoints and bindings use this list, in this
-// order. AgentState (simulator/agent_state.h) stores the fields in host memory.
+// List of all fields of an agent's state, each an array over all agents. Hashes, checkpoints and bindings use the order
+// of this list.
 #pragma once
 
 #include "pictura/common/color.h"
@@ -8,49 +7,47 @@
 
 namespace pictura {
 
-/// Status of a controlled agent in its episode. Halted agents remain as obstacles. Recorded agents follow their
-/// records: other agents see them and can collide with them, but they have no events until an action makes them active.
-/// Waiting agents have left the map on a road that ends; they have no box until they enter a road again.
+/// Status of a controlled agent. Halted agents remain as obstacles. Recorded agents are obstacles too, but have no
+/// events until an action makes them active. Waiting agents have left an open map and have no box until they enter
+/// again.
 enum class AgentStatus : uint8_t { active, halted, parked, absent, recorded, waiting };
 
-/// Whether an agent with this status has a box in its world.
 PICTURA_HD constexpr bool has_body(AgentStatus status) {
   return status != AgentStatus::absent && status != AgentStatus::waiting;
 }
 
-/// Whether an action would move an agent with this status: it is active or follows its record.
+/// Whether an action would move the agent.
 PICTURA_HD constexpr bool takes_actions(AgentStatus status) {
   return status == AgentStatus::active || status == AgentStatus::recorded;
 }
 
-/// Consequence of an infraction for its agent: it halts, leaves the episode, or drives on with the infraction counted.
+/// Consequence of an infraction: the agent halts, leaves the episode, or drives on.
 enum class AfterInfraction : uint8_t { halt, leave, drive_on };
 
-/// Reason why an agent got no place at the start of its episode.
+/// Reason why an agent got no place in its episode.
 enum class SpawnFailure : uint8_t {
   none,
-  no_place,  // the map has no place for its class
-  taken,     // all tried places were occupied, or too near to another box
+  no_place,  // none on the map for its class
+  taken,     // no tried place was free
 };
 
-/// Bits of the events of an agent in a step. The events that halted an agent are also stored as its halt_reason.
+/// Event bits of an agent's step. halt_reason stores the events that halted it.
 enum Event : uint8_t {
   kEventNone = 0,
   kEventCollision = 1,
-  kEventAtFault = 2,  // always together with kEventCollision
+  kEventAtFault = 2,  // always with kEventCollision
   kEventOffRoad = 4,
   kEventRedLight = 8,
   kEventWall = 16,
-  kEventGoal = 32,         // a chain's last waypoint was passed
-  kEventWaypoint = 64,     // an intermediate waypoint was passed
-  kEventMetricGoal = 128,  // a chain's last waypoint was passed within 2 m
+  kEventGoal = 32,         // passed a chain's last waypoint
+  kEventWaypoint = 64,     // passed an intermediate waypoint
+  kEventMetricGoal = 128,  // passed a chain's last waypoint within 2 m
 };
-/// Events that are infractions. By default, they halt the agent; see AfterInfraction.
 constexpr int kInfractions = kEventCollision | kEventOffRoad | kEventRedLight | kEventWall;
 
 constexpr int kNumWaypoints = 3;
 
-// Each row is X(name, type, values per agent, initial value, comment).
+// X(name, type, values per agent, initial value, comment).
 #define PICTURA_EPISODE_FIELDS(X)                                                                                \
   X(x_m, float, 1, 0, "rear axle, or the centre of a pedestrian")                                                \
   X(y_m, float, 1, 0, "")                                                                                        \
@@ -96,8 +93,8 @@ constexpr int kNumWaypoints = 3;
   X(episode_return, float, 1, 0, "sum of rewards in this episode")
 
 // Fields of lives. A life lasts from an agent's start or entry until the agent leaves the map or halts, or the episode
-// ends. On maps with roads that end, several lives follow each other in a slot. On other maps these fields keep their
-// initial values, and saved states and hashes omit them.
+// ends. A slot can have several lives only on open maps, whose roads end. On other maps these fields keep their initial
+// values, and saved states and hashes omit them.
 #define PICTURA_LIFE_FIELDS(X)                                                \
   X(life, int32_t, 1, 0, "number of earlier lives in this episode")           \
   X(life_step, int32_t, 1, 0, "step of this episode at which the life began") \
@@ -105,15 +102,14 @@ constexpr int kNumWaypoints = 3;
 
 #define PICTURA_AGENT_FIELDS(X) PICTURA_EPISODE_FIELDS(X) PICTURA_LIFE_FIELDS(X)
 
-/// Pointers to the arrays of all fields, in host or device memory, for the rules.
+/// Arrays of all fields, in host or device memory.
 struct AgentStateView {
 #define X(name, type, per_agent, first, comment) type* name;
   PICTURA_AGENT_FIELDS(X)
 #undef X
 };
 
-/// Copies every field of one agent. It reads all fields before it writes the first, so that a GPU can overlap the
-/// reads.
+/// Reads all fields before it writes the first, so that a GPU can overlap reads.
 PICTURA_HD inline void copy_fields(const AgentStateView& from, int from_slot, const AgentStateView& to, int to_slot){
 #define X(name, type, per_agent, first, comment) \
   type name[per_agent];                          \
@@ -126,7 +122,7 @@ PICTURA_HD inline void copy_fields(const AgentStateView& from, int from_slot, co
 #undef X
 }
 
-/// Sets every field of one agent to its initial value.
+/// Sets initial values.
 PICTURA_HD inline void reset_fields(const AgentStateView& agents, int slot) {
 #define X(name, type, per_agent, first, comment) \
   for (int i = 0; i < (per_agent); ++i) agents.name[slot * (per_agent) + i] = static_cast<type>(first);

@@ -1,4 +1,4 @@
-// Hashing of single values and names.
+// Hashing of values and names.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// Adds the bytes of values to a hash. Their types must have no padding.
+/// Adds the bytes of values. Their types must have no padding.
 template <typename... Values>
 void add_values(Hash64* hash_inout, const Values&... values) {
   (hash_inout->add_bytes(&values, sizeof(values)), ...);

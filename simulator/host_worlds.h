@@ -1,4 +1,4 @@
-// Worlds and results of a simulator on the host. The rules of the simulation run on a WorldView of each world.
+// Worlds and results of a simulator on the host.
 #pragma once
 
 #include <vector>
@@ -12,8 +12,8 @@ struct HostWorlds {
   explicit HostWorlds(SimulatorSetup its_setup);
   HostWorlds(const HostWorlds&) = delete;
   HostWorlds& operator=(const HostWorlds&) = delete;
-  /// Replaces the worlds by those of another setup, in their initial state. Moves an array only if its capacity is too
-  /// small.
+  /// Replaces the worlds by those of another setup, in their initial state. Moves only arrays with too small a
+  /// capacity.
   void assign(const SimulatorSetup& other);
   void reserve(const SimulatorCapacity& capacity);
 
@@ -21,16 +21,16 @@ struct HostWorlds {
 
   SimulatorSetup setup;
   SimulatorState state;
-  // Grid of each world: a cell lists the boxes whose centres are in the cell. Every step rebuilds the lists.
+  // Boxes by the cells of their centres.
   std::vector<CellLists> box_cells;  // [worlds]
-  std::vector<Vec2> cell_centers;    // centres of the boxes, in the order of each world's box_cells
+  std::vector<Vec2> cell_centers;    // in the order of box_cells
   SceneBatch scene;
 
  private:
   void make_cells_and_scene();
 };
 
-/// Outputs of a simulator on the host besides the state: rewards, ends of episodes, observations and views.
+/// Outputs besides the state.
 struct HostResults {
   HostResults() = default;
   HostResults(size_t num_slots, const SimulatorConfig& config) { resize(num_slots, config); }

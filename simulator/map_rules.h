@@ -1,5 +1,4 @@
-// A RoadMap flattened into the data that the rules of the simulation read: straight pieces, links and cell lists. It is
-// made once per map; all worlds on the map share it.
+// A RoadMap flattened into the data that the rules of the simulation read. All worlds on a map share them.
 #pragma once
 
 #include <memory>
@@ -14,7 +13,7 @@
 
 namespace pictura {
 
-/// Grid over the map with a list of items for each cell. The builder of the lists chooses the order of the items.
+/// Grid with a list of items per cell.
 struct CellLists {
   Vec2 origin_m;
   float cell_m = 1;
@@ -25,7 +24,7 @@ struct CellLists {
   GridView view() const { return {origin_m, cell_m, num_x, num_y, begin, items}; }
 };
 
-/// Recorded tracks and lights of a map that was compiled from a recorded scene; empty for other maps.
+/// Recorded tracks and lights; empty without a recorded scene.
 struct MapRecord {
   std::vector<RecordedAgent> agents;
   std::vector<RecordedState> states;     // [agents, steps]
@@ -37,16 +36,16 @@ struct MapRecord {
   const RecordedState& state(size_t agent, int32_t step) const {
     return states[agent * static_cast<size_t>(num_steps) + static_cast<size_t>(step)];
   }
-  /// First episode step at which the agent is present; -1: none.
+  /// First episode step with a recorded state; -1: none.
   int32_t first_step(size_t agent) const;
 };
 
 struct MapRules {
   std::vector<LaneSegment> segments;
-  std::vector<MapLane> lanes;  // all lanes of the RoadMap, in its order; lanes that are not drivable have no segments
+  std::vector<MapLane> lanes;  // in RoadMap order; without segments if not drivable
   std::vector<int32_t> successors;
   std::vector<Barrier> edges, walls;
-  std::vector<StopLine> stop_lines;  // one for each of RoadMap::lights, in its order
+  std::vector<StopLine> stop_lines;  // in the order of RoadMap::lights
   std::vector<int32_t> spawn_lanes;
   std::vector<float> spawn_end_m;
   std::vector<Exit> exits;
@@ -59,18 +58,17 @@ struct MapRules {
   CellLists near_lane_pieces, near_boundary_pieces, near_wall_pieces, near_stop_lines;
   Vec2 low_m, high_m;
   MapRecord record;
-  SideEdges sides;  // filled if the map has a record
+  SideEdges sides;  // only with a record
   float max_box_radius_m = 0, max_speed_mps = 0;
   bool is_open = false;
 
   MapView view() const;
-  /// Size of one piece of memory that holds all arrays of the view, each aligned to kMapAlignment_bytes.
+  /// Memory for all arrays of the view, each aligned to kMapAlignment_bytes.
   int64_t size_bytes() const;
 };
 constexpr size_t kMapAlignment_bytes = 256;
 
-/// Makes the rules of a map. Agents can observe walls if `observe_walls`. For observed_span_m see MapOptions. Throws
-/// Error, which names the map, if it has no drivable lane.
+/// Throws Error, which names the map, if it has no drivable lane. For observed_span_m see MapOptions.
 MapRules make_map_rules(const RoadMap& map, Span<const WallFace> walls, bool observe_walls = false,
                         MapRecord record = {}, float observed_span_m = 0);
 

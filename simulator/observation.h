@@ -1,5 +1,4 @@
-// Sizes of the observation (paper, table of the policy architecture), and the list of its arrays.
-// docs/reference/observation.md defines every observed number, its unit and its scale.
+// Sizes and arrays of the observation (paper, table of the policy architecture); see docs/reference/observation.md.
 #pragma once
 
 #include "pictura/common/span.h"
@@ -16,16 +15,15 @@ constexpr int kMaxControls = 10, kControlFeatures = 7;
 constexpr int kMaxWalls = 80, kWallFeatures = 7;
 constexpr int kWaypointFeatures = 3;
 
-/// Entity sets, in the order of ObservationView::set_counts.
+/// In the order of ObservationView::set_counts.
 enum class EntitySet : int32_t { partners, lanes, boundaries, controls, walls };
 constexpr int kNumEntitySets = 5;
 
-/// Condition for the presence of an array: `own` arrays are always present, `sets` need
-/// SimulatorConfig::vector_observations, and `walls` also need SimulatorConfig::wall_observations.
+/// Condition for an array: `own` arrays are always present, `sets` need SimulatorConfig::vector_observations, and
+/// `walls` also need SimulatorConfig::wall_observations.
 enum class ObservationPart : uint8_t { own, sets, walls };
 
-// X(name, type, rows, features, part, comment): the arrays of an observation, [slots, rows, features]. Simulators,
-// observation_arrays(), bindings and policies all use this list.
+// X(name, type, rows, features, part, comment): arrays [slots, rows, features].
 #define PICTURA_OBSERVATION_ARRAYS(X)                                                                            \
   X(ego, float, 1, kEgoFeatures, ObservationPart::own, "")                                                       \
   X(partners, float, kMaxPartners, kPartnerFeatures, ObservationPart::sets, "")                                  \
@@ -37,8 +35,7 @@ enum class ObservationPart : uint8_t { own, sets, walls };
   X(conditioning, float, 1, kNumConditioning, ObservationPart::own, "scaled; see docs/reference/observation.md") \
   X(waypoints, float, kNumWaypoints, kWaypointFeatures, ObservationPart::own, "ego frame")
 
-/// Observations of all slots. Rows of an entity set beyond its count are zeros. Arrays that the simulator does not
-/// compute are empty.
+/// Observations of all slots. Rows beyond an entity set's count are zeros. Arrays that are not computed are empty.
 struct ObservationView {
 #define X(name, type, rows, features, part, comment) Span<type> name;
   PICTURA_OBSERVATION_ARRAYS(X)

@@ -1,4 +1,4 @@
-// Names, types and shapes of an observation's arrays, generated from the list in observation.h.
+// Names, types and shapes of an observation's arrays.
 #pragma once
 
 #include <string_view>
@@ -9,7 +9,6 @@
 
 namespace pictura {
 
-/// Name, type and shape of one array of an observation.
 struct ObservationArray {
   std::string_view name;
   ElementType type;
@@ -17,14 +16,14 @@ struct ObservationArray {
   ObservationPart part;
 };
 
-/// All possible arrays of an observation, in the order of the list.
+/// All possible arrays.
 constexpr ObservationArray kObservationArrays[] = {
 #define X(name, type, rows, features, part, comment) {#name, element_type<type>(), rows, features, part},
     PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
 };
 
-/// Returns the arrays that are present (not empty), each [slots, rows, features], in the order of the list.
+/// Returns the nonempty arrays, each [slots, rows, features].
 std::vector<NamedArray> observation_arrays(const ObservationView& observations, int num_slots, Device device);
 
 }  // namespace pictura

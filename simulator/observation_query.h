@@ -1,4 +1,4 @@
-// Input of Simulator::observe(), which computes hypothetical observations. Plain structs for host and device code.
+// Input of Simulator::observe(), for host and device code.
 #pragma once
 
 #include "pictura/common/scene_types.h"
@@ -6,24 +6,23 @@
 
 namespace pictura {
 
-/// Question: what would a slot observe if some boxes were hidden and some boxes were inserted?
+/// Question: what would a slot observe if some boxes were hidden and others inserted?
 struct ObservationQuery {
   int32_t slot = 0;
-  int32_t hidden_begin = 0, hidden_end = 0;      // hidden boxes: a range of a list of indices into scene().agents
-  int32_t inserted_begin = 0, inserted_end = 0;  // inserted boxes: a range of a list of InsertedBoxes
-  /// 0: hidden boxes are ignored, so that farther boxes take their rows among the partners (the observed road users).
-  /// 1: hidden boxes keep their rows, which are zeros.
+  int32_t hidden_begin = 0, hidden_end = 0;      // range of ObservationQueries::hidden
+  int32_t inserted_begin = 0, inserted_end = 0;  // range of ObservationQueries::inserted
+  /// 0: farther boxes take the rows of hidden boxes among the partners (observed road users). 1: these rows are zeros.
   int32_t leaves_gaps = 0;
 };
 
-/// A hypothetical box. It is ignored if box.drawn is 0.
+/// Hypothetical box, which is ignored if box.drawn is 0.
 struct InsertedBox {
   AgentBox box;
-  float speed_mps = 0;  // signed, along the heading; observed as an auxiliary feature
+  float speed_mps = 0;  // signed, along the heading; auxiliary feature
 };
 
-/// Queries, the lists to which they refer, and the output. Each array of `out` has one row per query; arrays that the
-/// simulator does not fill are empty.
+/// `hidden` contains indices into scene().agents. Each array of `out` has one row per query, or is empty if not
+/// computed.
 struct ObservationQueries {
   Span<const ObservationQuery> queries;
   Span<const int32_t> hidden;

@@ -1,4 +1,4 @@
-// The eleven terms of the reward, by name.
+// Terms of the reward.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -36,8 +36,7 @@ struct RewardTermsOf {
 
 using RewardTerms = RewardTermsOf<float>;
 
-/// Quantities of an agent's step that are summed into SimulatorTotals. Aligned to 16 bytes, because GPUs copy 16 bytes
-/// with one instruction.
+/// Sums for SimulatorTotals. Aligned, because a GPU copies 16 bytes with one instruction.
 struct alignas(16) StepSums {
   float distance_m = 0;
   RewardTerms reward_terms;

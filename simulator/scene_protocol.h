@@ -1,5 +1,4 @@
-// Settings of evaluations in recorded scenes: the paper's zero-shot protocol, protocols of other published results, and
-// every rule that a caller can change.
+// Protocols of evaluations in recorded scenes: the paper's and those of other published results.
 #pragma once
 
 #include <string>
@@ -11,70 +10,63 @@
 
 namespace pictura {
 
-/// Values of protocol settings; docs/explanation/evaluation.md "Protocols" defines them.
+/// Values of protocol settings; see docs/explanation/evaluation.md "Protocols".
 enum class Overlapping : uint8_t { replay, drive };
 enum class Others : uint8_t { replay, absent };
 enum class Late : uint8_t { replay, drive, absent };
 enum class RecordEnd : uint8_t { stand, vanish };
 enum class Waypoints : uint8_t { goal, path };
 
-/// Protocol of an evaluation: the road users that the policy drives, their goals, and the treatment of events. The
-/// default values are the paper's (zero-shot evaluation, appendix B). If the paper states no value, the default is this
-/// project's choice; docs/explanation/evaluation.md lists these choices.
+/// Evaluation protocol. Defaults are the paper's (zero-shot evaluation, appendix B) or, where it states none, this
+/// project's choice (docs/explanation/evaluation.md).
 struct SceneProtocol {
   std::string name = "womd";
-  std::string control = "self,vehicles";  // driven road users: words for tracks_selected_by()
-  int start_step = 0;                     // step of the recording at which episodes begin
+  std::string control = "self,vehicles";  // words for tracks_selected_by()
+  int start_step = 0;                     // recorded step at episode starts
   int steps = 600;
-  std::vector<double> densities{1.0, 0.75, 0.5};  // shares of a scene's road users that remain
-  int rollouts = 1;                               // number of drives per scene, each drive with its own random draws
-  float box_scale = 1;                            // factor on the length and width of all boxes
-  // Minimum distance from the start to the goal; a road user that starts nearer follows the recording. 0: no minimum.
+  std::vector<double> densities{1.0, 0.75, 0.5};  // remaining shares of a scene's road users
+  int rollouts = 1;                               // drives per scene, each with own random draws
+  float box_scale = 1;                            // factor on length and width of boxes
+  // A road user nearer to its goal at the start follows the recording.
   float min_distance_to_goal_m = 2;
-  // Maximum turn between a road user's first two recorded states. After a larger turn, the road user starts with the
-  // second heading, because the first heading contradicts its motion. 0: any turn.
+  // Maximum turn between the first two recorded states; 0: any. After a larger turn, a road user starts with the second
+  // heading, because the first contradicts its motion.
   float max_first_turn_deg = 0;
-  bool replay_experts = false;  // whether road users that the scene file marks as experts follow the recording
-  // Maximum number of driven road users per scene; 0: no limit. The self-driving car comes first, then the others in
-  // the order of the scene file.
+  bool replay_experts = false;  // road users marked as experts in the scene file
+  // Maximum per scene; 0: no limit. The self-driving car comes first, then the order of the file applies.
   int max_driven = 0;
   // Role of road users whose initial box touches another box or the road's edge, or is off the road.
   Overlapping overlapping = Overlapping::replay;
-  Others others = Others::replay;  // role of pedestrians, cyclists and other non-vehicles that `control` excludes
+  Others others = Others::replay;  // non-vehicles that `control` excludes
   Late late = Late::replay;
-  RecordEnd record_end = RecordEnd::stand;  // behavior of replayed road users after the end of their recording
+  RecordEnd record_end = RecordEnd::stand;  // replayed road users after their recording
   AfterInfraction after_infraction = AfterInfraction::halt;
   bool leave_at_goal = true;
-  Waypoints waypoints = Waypoints::goal;  // `goal`: the goal three times; `path`: two points on the recorded path, then
-                                          // the goal
+  Waypoints waypoints = Waypoints::goal;  // `goal`: three times the goal; `path`: two points on the recorded path first
   float observed_span_m = 5;              // see MapOptions
 };
 
-/// Returns the protocols: womd (the paper's), gpudrive, pufferdrive2, pufferdrive3, waymax and simagents.
+/// womd (the paper's), gpudrive, pufferdrive2, pufferdrive3, waymax and simagents.
 const std::vector<SceneProtocol>& scene_protocols();
 std::vector<std::string> scene_protocol_names();
-/// Returns the protocol of this name. Throws UsageError, which lists the names, for an unknown name.
+/// Throws UsageError, which lists the names, for an unknown name.
 SceneProtocol scene_protocol(const std::string& name);
 
-/// Setting of a protocol that set_scene_rule() can change.
+/// Setting that set_scene_rule() can change.
 struct SceneRule {
   const char* name;
-  const char* values;  // for instance "replay, drive, absent" or "0 to 2"
+  const char* values;  // such as "replay, drive, absent" or "0 to 2"
   const char* what;
 };
 std::vector<SceneRule> scene_rules();
-/// Sets a rule from "name=value". Throws UsageError, which lists the valid names or values, for an invalid name or
-/// value.
+/// Sets a rule from "name=value". Throws UsageError, which lists valid names or values, for an invalid one.
 void set_scene_rule(const std::string& assignment, SceneProtocol* protocol_inout);
-/// Returns names and values of all rules.
 std::vector<std::pair<std::string, std::string>> rules_of(const SceneProtocol& protocol);
 
-/// Throws UsageError, which names the setting, if a setting is invalid. Examples are `steps` below 1, a density outside
-/// (0, 1], and a track id or an unknown word in `control`.
+/// Throws UsageError, which names the setting, for an invalid setting.
 void check(const SceneProtocol& protocol);
 
-/// Row of the paper's table on the Waymo Open Motion Dataset (zero-shot self-play, 44,073 scenes of the validation
-/// set).
+/// Row of the paper's table on the Waymo Open Motion Dataset (zero-shot self-play, 44,073 validation scenes).
 struct PaperSceneRow {
   const char* agent;
   double density, at_fault, off_road, goals;

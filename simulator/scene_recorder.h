@@ -1,4 +1,4 @@
-// Recording of a simulated world as a scene, so that other agents can later drive among the recorded traffic.
+// Recording of a simulated world as a scene, in which other agents can drive later.
 #pragma once
 
 #include <cstdint>
@@ -12,33 +12,28 @@
 
 namespace pictura {
 
-/// Records one episode of a world. The controlled agents and then the parked cars become the tracks of a scene. Light
-/// states become its recorded lights. The simulator must work in host memory.
+/// Records one episode of a world. Controlled agents and parked cars become tracks.
 class SceneRecorder final : public StepObserver {
  public:
-  /// Records the simulator's current state as the first step. The simulator must outlive the recorder. Throws
-  /// UsageError if the simulator does not work in host memory, or if it has no such world.
+  /// Records the current state as the first step. The simulator must outlive the recorder. Throws UsageError if the
+  /// simulator does not work in host memory or has no such world.
   explicit SceneRecorder(Simulator& simulator, int world = 0);
 
-  /// Records a step of the episode; steps after the episode are ignored. Throws Error if the scene would become too
-  /// long.
+  /// Ignores steps after the episode. Throws Error if the scene would become too long.
   void after_step(const StepResult& result) override;
   void after_reset(Span<const uint8_t> world_mask) override;
-  /// Whether the recorded episode is over.
   bool is_over() const { return is_over_; }
   int32_t num_steps() const { return num_steps_; }
 
-  /// Returns the scene so far. Its tracks are the agents that were present at any step. The id of a track is the index
-  /// of the agent's box in the world. On roads that end, each life is a track: life k of box b (both counted from 0)
-  /// has the id b + k * (number of boxes). self_agent is the agent whose track is the self-driving car; -1: none. In a
-  /// world of a recorded scene, ids, types, recorded lights and the self-driving car are those of that scene. An empty
-  /// `id` is replaced by an id made of map name, seed, world and episode. Throws UsageError if self_agent was never
-  /// present.
+  /// Returns the scene so far. Each box that was present at any step has a track, whose id is its index in the world.
+  /// On open maps, each life has a track: life k of box b (counted from 0) has the id b + k * (number of boxes).
+  /// self_agent is the self-driving car; -1: none. Worlds of recorded scenes keep ids, types, lights and the
+  /// self-driving car. An empty `id` becomes map name, seed, world and episode. Throws UsageError if self_agent was
+  /// never present.
   Scenario scenario(std::string id = "", int self_agent = -1) const;
 
  private:
   Span<const AgentBox> boxes() const;
-  /// Records the current state if the simulator took another step of the recorded episode.
   void follow();
   void add_step();
 

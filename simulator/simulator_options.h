@@ -1,4 +1,4 @@
-// Names of the simulator's options, for configuration files and other callers that set options by name.
+// Names of the simulator's options.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace pictura {
 
-/// Calls visit(name, share) for each impairment, in the order of Impairment.
+/// In the order of Impairment.
 template <typename Shares, typename Visit>
 void visit_impairments(Shares&& shares, const Visit& visit) {
   visit("blind", shares.blind);
@@ -19,7 +19,7 @@ void visit_impairments(Shares&& shares, const Visit& visit) {
   visit("inattentive", shares.inattentive);
 }
 
-/// Visits the options in table [simulator] of configuration files, in the order in which files are written.
+/// Options of table [simulator] in configuration files.
 template <typename AnyConfig, typename Visitor>
 void visit_simulator_keys(AnyConfig& c, Visitor&& v) {
   v.value(NamedKey("simulator.episode_steps", Evaluation::replaced), c.episode_steps, 1, 1 << 24);

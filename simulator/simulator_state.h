@@ -1,5 +1,4 @@
-// State of a simulator in host memory: all data that are saved. The executor `cpu` steps this state; the executor
-// `cuda` has a copy in device memory. Both use the functions below for saving, restoring, hashing and counting.
+// State of a simulator in host memory: all data that are saved. The executor `cuda` has a copy on the device.
 #pragma once
 
 #include <vector>
@@ -14,44 +13,42 @@ namespace pictura {
 struct SimulatorState {
   SimulatorState() = default;
   explicit SimulatorState(const SimulatorSetup& setup) { resize(setup); }
-  /// Resizes all arrays for the setup and sets initial values.
+  /// Sets initial values.
   void resize(const SimulatorSetup& setup);
-  /// Allocates for this capacity. A resize within the capacity then moves no array. `config` gives the number of parked
-  /// cars.
+  /// A resize within the capacity then moves no array.
   void reserve(const SimulatorCapacity& capacity, const SimulatorConfig& config);
 
   SpawnReport spawn_report(const SimulatorSetup& setup) const;
   SimulatorTotals totals() const;
-  /// Hash of the agents' fields, the light states and the parked cars.
+  /// Hash of the agents' fields, light states and parked cars.
   uint64_t hash(const SimulatorSetup& setup) const;
 
-  /// Copies the state of `count` worlds of another simulator, beginning with `from_world`, to the worlds that begin
-  /// with `world`. Each pair of worlds must have equal sizes.
+  /// Copies `count` worlds from `from_world` on to the worlds from `world` on. Each pair must have equal sizes.
   void copy_worlds(const SimulatorSetup& setup, int world, const SimulatorState& from, const SimulatorSetup& from_setup,
                    int from_world, int count);
 
   std::vector<uint8_t> save(const SimulatorSetup& setup) const;
-  /// Restores a saved state. Throws Error, leaving everything unchanged, if the bytes come from a different simulator
-  /// (the message names the difference), or if a field has an invalid value.
+  /// Throws Error, leaving everything unchanged, for bytes of a different simulator (the message names the difference)
+  /// or with an invalid field value.
   void restore(const SimulatorSetup& setup, Span<const uint8_t> bytes);
 
   AgentState agents;
   std::vector<AgentBox> boxes, boxes_before;  // the scene's agents
   std::vector<LightPlan> light_plans;
   std::vector<LightState> lights;
-  std::vector<uint64_t> seed;                        // [worlds] seeds of random numbers
+  std::vector<uint64_t> seed;                        // [worlds]
   std::vector<int32_t> episode_step, episode_index;  // [worlds]
   std::vector<uint8_t> episode_over;                 // [worlds] 1: the next step resets the world
-  std::vector<int32_t> spawned;                      // [worlds] number of agents in the current episode
+  std::vector<int32_t> spawned;                      // [worlds] agents in the current episode
   std::vector<SimulatorTotals> world_totals;         // [worlds]
 
-  /// Calls visit(a.array, b.array) for every array of the state except the agents' fields, in the order of saving. A
-  /// and B need not be the same type, but must have members with the same names.
+  /// Calls visit(a.array, b.array) for every array except the agents' fields, in the order of saving. Types A and B
+  /// must have members with the same names.
   template <typename A, typename B, typename Visit>
   static void visit_arrays(A& a, B& b, Visit&& visit) {
     visit_arrays_by_kind(a, b, visit, visit, visit);
   }
-  /// Variant of visit_arrays() with separate visitors for arrays indexed by box, by light and by world.
+  /// Variant with visitors for arrays indexed by box, by light and by world.
   template <typename A, typename B, typename OfBoxes, typename OfLights, typename OfWorlds>
   static void visit_arrays_by_kind(A& a, B& b, OfBoxes&& of_boxes, OfLights&& of_lights, OfWorlds&& of_worlds) {
     of_boxes(a.boxes, b.boxes);
@@ -67,18 +64,16 @@ struct SimulatorState {
   }
 
  private:
-  /// Size of the saved state without its header, and copying of that state to and from bytes. `with_lives` includes the
-  /// fields of lives.
   size_t saved_bytes(bool with_lives) const;
   void copy_to(uint8_t* bytes_out, bool with_lives) const;
   void assign_from(const uint8_t* bytes, bool with_lives);
 };
 
-/// Returns the error message for a rejected command. `rejected` is a result of rejected_command().
+/// Error message for a result of rejected_command().
 std::string rejection_text(int64_t rejected);
-/// Returns the error message for a result of find_edit_fault().
+/// Error message for a result of find_edit_fault().
 std::string edit_fault_text(int64_t fault, int num_slots);
-/// Returns the error message for a result of find_query_fault().
+/// Error message for a result of find_query_fault().
 std::string query_fault_text(int64_t fault, int num_slots);
 
 }  // namespace pictura

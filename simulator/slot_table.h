@@ -1,14 +1,13 @@
-// World and agent of each slot. A plain struct for host and device code.
+// World and agent of each slot.
 #pragma once
 
 #include "pictura/common/span.h"
 
 namespace pictura {
 
-/// Mapping between slots, worlds and agents.
 struct SlotTable {
   Span<const int32_t> world_of_slot, agent_of_slot;  // [slots] index of the world; index of the agent in its world
-  Span<const int32_t> slot_begin;                    // [worlds + 1] the first slot of each world
+  Span<const int32_t> slot_begin;                    // [worlds + 1] first slot of each world
   Span<const uint32_t> global_world;                 // [worlds] WorldSpec::global_world
 };
 

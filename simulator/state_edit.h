@@ -1,5 +1,4 @@
-// New values of some fields of some agents: the input of Simulator::set_state(). A plain struct for host and device
-// code.
+// New values of some fields of some agents, for Simulator::set_state().
 #pragma once
 
 #include "pictura/simulator/fields.h"
@@ -16,7 +15,7 @@ enum class AgentField : int32_t {
 struct StateEdit {
   int32_t count = 0;
   const int32_t* slots = nullptr;  // [count]
-// Arrays of new values, [count, per agent]. The field of a null pointer stays unchanged.
+// New values [count, per agent]. The field of a null pointer stays unchanged.
 #define X(name, type, per_agent, first, comment) const type* name = nullptr;
   PICTURA_AGENT_FIELDS(X)
 #undef X

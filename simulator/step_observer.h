@@ -1,29 +1,27 @@
-// Interface of observers that follow a simulator step by step (recorders, live views, probes), and step_observed(),
-// which takes a step and notifies observers.
+// Observers of a simulator's steps, such as recorders and live views.
 #pragma once
 
 #include "pictura/simulator/simulator.h"
 
 namespace pictura {
 
-/// An observer of a simulator's steps. All spans are in the memory of the simulator's device.
+/// All spans are in memory of the simulator's device.
 class StepObserver {
  public:
   virtual ~StepObserver() = default;
   /// Whether the next step may be taken. The call may block for a short time.
   virtual bool is_due() { return true; }
-  /// Replaces the commands [slots] of agents that the observer drives. step_observed() calls this for all observers
-  /// before the first before_step().
+  /// Replaces the commands [slots] of agents that the observer drives, before the first before_step().
   virtual void override_commands(Span<Command> /*commands_inout*/) {}
   virtual void before_step(Span<const Command> /*commands*/) {}
   virtual void after_step(const StepResult& /*result*/) {}
-  /// Called after a reset, which starts new episodes outside of a step. The mask [worlds] selects the reset worlds; an
-  /// empty mask means all worlds.
+  /// Called after a reset outside of a step. The mask [worlds] selects the reset worlds; an empty mask means all
+  /// worlds.
   virtual void after_reset(Span<const uint8_t> /*world_mask*/) {}
 };
 
-/// Takes a step with commands [slots]. Calls before_step() of the observers in their order, and after_step() in reverse
-/// order, like nested scopes.
+/// Takes a step with commands [slots]. Calls before_step() of the observers in order, and after_step() in reverse
+/// order.
 template <typename Observers>
 StepResult step_observed(Simulator& simulator, Span<Command> commands_inout, const Observers& observers,
                          Stream stream = {}) {

@@ -1,5 +1,5 @@
-// Totals of a simulator. Every executor adds floating-point numbers in the same order, so that sums are bit-identical.
-// Agent i of a world adds to bin i mod kTotalsBins; then the bins are added in order.
+// Totals of a simulator, bit-identical on every executor: agent i of a world adds to bin i mod kTotalsBins, then the
+// bins are added in order.
 #pragma once
 
 #include "pictura/common/portable/hd.h"
@@ -9,9 +9,9 @@ namespace pictura {
 
 constexpr int kTotalsBins = 32;
 
-constexpr float kRest_mps = 0.3f;  // agents up to this speed count as at rest
+constexpr float kRest_mps = 0.3f;  // maximum speed at rest
 
-// X(total, name in a run's log, events): number of agent-steps with at least one of the events.
+// X(total, name in a run's log, events): agent-steps with at least one of the events.
 #define PICTURA_EVENT_TOTALS(X)                                \
   X(goals_reached, goals, kEventMetricGoal)                    \
   X(waypoints_reached, waypoints, kEventWaypoint | kEventGoal) \
@@ -21,8 +21,7 @@ constexpr float kRest_mps = 0.3f;  // agents up to this speed count as at rest
   X(red_light, red_light, kEventRedLight)                      \
   X(wall_contacts, wall_contacts, kEventWall)
 
-// COUNT(total, ...) declares an integer, SUM(total) a floating-point sum, TERMS(total) a floating-point sum for each
-// reward term.
+// COUNT is an integer, SUM a floating-point sum, TERMS such a sum for each reward term.
 #define PICTURA_TOTALS(COUNT, SUM, TERMS)                                                       \
   COUNT(agent_steps) /* steps of single active agents */                                        \
   COUNT(slot_steps)  /* number of slots times steps */                                          \
@@ -48,10 +47,8 @@ struct SimulatorTotals {
 #undef TERMS
 
   PICTURA_HD void add(const SimulatorTotals& part) { visit(*this, part, Add{}, Add{}); }
-  /// Subtracts earlier totals. The result counts what has happened since `before`.
   PICTURA_HD void subtract(const SimulatorTotals& before) { visit(*this, before, Subtract{}, Subtract{}); }
 
-  /// Calls visit_count(a.total, b.total) for all counts, and visit_sum(a.total, b.total) for all floating-point sums.
   template <typename Other, typename VisitCount, typename VisitSum>
   PICTURA_HD static void visit(SimulatorTotals& a, Other& b, const VisitCount& visit_count, const VisitSum& visit_sum) {
 #define COUNT(name, ...) visit_count(a.name, b.name);

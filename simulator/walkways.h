@@ -1,5 +1,5 @@
-// Walkways of pedestrians: the centre lines of sidewalks and crosswalks, as a network of straight pieces. On maps
-// without sidewalks, shoulders replace them. Pedestrians walk in both directions.
+// Walkways of pedestrians: straight pieces of the centre lines of crosswalks and sidewalks (shoulders on maps without
+// sidewalks), in both directions.
 #pragma once
 
 #include <vector>
@@ -11,14 +11,13 @@ namespace pictura {
 
 struct Walkways {
   std::vector<WalkPiece> pieces;     // in pairs, one per direction
-  std::vector<float> end_m;          // [pieces] running sum of the pieces' lengths
+  std::vector<float> end_m;          // [pieces] running sum of lengths
   std::vector<int32_t> leave_begin;  // [nodes + 1] into `leaving`
   std::vector<int32_t> leaving;      // pieces that leave each node
 };
 
-/// Makes the walkways of a map. Omits pieces on the drivable surface of `roads` (except on crosswalks), and connected
-/// networks whose total length is below kMinWalk_m. Only the lanes of `roads` and their cells are read. The result is
-/// empty if the map has no walkways.
+/// Makes a map's walkways. Omits pieces on the drivable surface of `roads` (except crosswalks), and connected networks
+/// shorter than kMinWalk_m. Reads only the lanes and cells of `roads`.
 Walkways make_walkways(const RoadMap& map, const MapView& roads);
 
 constexpr float kMinWalk_m = 40.0f;
