@@ -1,5 +1,5 @@
-// Actions and advantages of a rollout's agents, separately for agents at rest and agents that move. Without the
-// separation an agent that has learnt to stand still looks like an agent that has learnt to drive safely.
+// Actions and advantages of a rollout's agents, separately at rest and moving. A mean over both could not tell a policy
+// that stands still from one that drives safely.
 #pragma once
 
 #include <array>
@@ -10,20 +10,20 @@
 
 namespace pictura {
 
-/// Statistics of the valid transitions of a group of agents.
+/// Statistics of a group's valid transitions.
 struct AgentGroup {
-  double kept_share = 0;      // share that the advantage filter keeps
+  double kept_share = 0;      // kept by the advantage filter
   double mean_advantage = 0;  // before normalisation
   std::array<double, kNumActions> action_shares{};
 };
 
 struct AgentGroups {
-  double rest_share = 0;  // share of valid transitions in which the agent is at rest
+  double rest_share = 0;  // share of valid transitions
   AgentGroup rest, moving;
 };
 
-/// Groups the valid transitions of all ranks' rollouts, whose advantages must be computed already. The advantage filter
-/// keeps a transition if its |advantage| is at least adv_threshold. Values of a group without transitions are NaN.
+/// Groups the valid transitions of all ranks' rollouts, which need advantages. The filter keeps transitions with
+/// |advantage| >= adv_threshold. Values of an empty group are NaN.
 AgentGroups group_agents(const Rollout& rollout, double adv_threshold,
                          Communicator* communicator = single_communicator());
 

@@ -1,6 +1,5 @@
-// Runs a policy on chunks of a rollout's rows: gathers observations, evaluates the policy, and computes the gradients
-// of losses. A row is one agent slot at one step. CUDA graphs reduce the launches for a chunk from hundreds to tens;
-// results are bit-identical.
+// Runs a policy and its losses on chunks of a rollout's rows (agent slots at steps). CUDA graphs save most launches,
+// with bit-identical results.
 #pragma once
 
 #include <functional>
@@ -13,69 +12,62 @@
 
 namespace pictura {
 
-/// Targets of all transitions of a rollout, [steps * slots]. Losses read them by row.
+/// Targets of a rollout's transitions, [steps * slots].
 struct Targets {
   at::Tensor actions;            // i64
-  at::Tensor old_log_probs;      // log-probabilities of these actions
+  at::Tensor old_log_probs;      // for these actions
   at::Tensor returns;            // in units of rewards
-  at::Tensor teacher_log_probs;  // for all actions, [steps * slots, kNumActions]; undefined without a teacher
-  at::Tensor teacher_weight;     // scalar, weight of the KL divergence from the teacher; undefined without a teacher
+  at::Tensor teacher_log_probs;  // [steps * slots, kNumActions]; undefined without a teacher
+  at::Tensor teacher_weight;     // scalar, weight of the teacher's KL divergence; undefined without a teacher
 };
 
-/// Losses of a chunk: means over its rows, with gradients.
+/// Losses of a chunk: means over rows, with gradients.
 struct Losses {
-  at::Tensor total;                   // loss to minimise: sum of all losses times their coefficients
-  at::Tensor policy, value, entropy;  // not multiplied by their coefficients
+  at::Tensor total;                   // sum of losses times coefficients, to minimise
+  at::Tensor policy, value, entropy;  // without coefficients
   at::Tensor stats;                   // stacked() statistics, without gradients
 };
 
-/// Computes the losses of a chunk from the policy's output. With CUDA graphs it is not called again after its work is
-/// captured, so every call must do the same work.
+/// Computes a chunk's losses. CUDA graphs do not call it again after capture, so each call must do the same work.
 using LossFunction =
     std::function<Losses(const Policy::Output& output, const Targets& targets, const Minibatch& chunk)>;
 
 class ChunkRunner {
  public:
-  /// The arguments must outlive the runner. If `graphs` is null, nothing is captured.
+  /// The arguments must outlive the runner. Null `graphs`: nothing is captured.
   ChunkRunner(const Policy& policy, const RolloutObservations& observations, PhaseTimer* timer = nullptr,
               Graphs* graphs = nullptr);
 
-  /// Returns the policy's output, without gradients, for rows (i64 [n]) of a rollout. The output is valid until the
-  /// next call. The time counts as Phase::forward.
+  /// Returns the policy's output without gradients for rows, i64 [n], valid until the next call. Counts as
+  /// Phase::forward.
   Policy::Output act(const at::Tensor& rows);
 
-  /// Returns the policy's output without gradients, computed as in updates but without CUDA graphs. The time counts as
-  /// Phase::learn.
+  /// Variant of act() that computes as in updates, without CUDA graphs. Counts as Phase::learn.
   Policy::Output forward_no_grad(const at::Tensor& rows);
 
-  /// Sets the targets of subsequent losses.
   void set_targets(const Targets& targets);
-  /// Adds the gradient of the loss on this rank's part of a minibatch to the parameters' gradients, which must be
-  /// defined. Computes it in chunks of at most forward_chunk rows. The time counts as Phase::learn and Phase::backward.
-  /// Returns the statistics of this rank's part, f64 [kNumLossStats], with 0 for the gradient norm. They are valid
-  /// until the next call.
+  /// Adds the loss gradient of this rank's part of a minibatch to the parameters' gradients, which must be defined.
+  /// Computes chunks of at most forward_chunk rows. Returns the part's statistics, f64 [kNumLossStats], valid until the
+  /// next call, with a gradient norm of 0. Counts as Phase::learn and Phase::backward.
   at::Tensor add_gradients(const Minibatch& minibatch, int64_t forward_chunk, const LossFunction& loss);
-  /// Returns the losses of one chunk, from which gradients can be computed. Uses no CUDA graphs. The time counts as
-  /// Phase::diagnose.
+  /// Returns one chunk's losses with gradients. Uses no CUDA graphs. Counts as Phase::diagnose.
   Losses losses(const Minibatch& chunk, const LossFunction& loss);
 
-  /// Discards all graphs. Must be called if the addresses of the observations' images change, for instance with another
-  /// renderer.
+  /// Discards all graphs. Call it if the observations' images move in memory, for instance with another renderer.
   void clear();
 
  private:
-  // Graphs and tensors for chunks of one size. Tensors that graphs read have a fixed address, so values are copied into
-  // them.
+  // Graphs for chunks of one size, with tensors at fixed addresses.
   struct Work {
     RepeatedWork observe, act, learn, backward;
     Minibatch chunk;
     Observation observation;
     Policy::Output output;
-    at::Tensor weight;  // weight of the chunk in its minibatch
+    at::Tensor weight;  // the chunk's weight in its minibatch
     Losses losses;
     int64_t last_use = 0;
   };
-  // Maximum number of sizes with graphs. For a further size, the graphs of the least recently used size are discarded.
+  // Maximum number of sizes with graphs.
   static constexpr size_t kMaxSizes = 8;
 
   Work& work_of(int64_t size);
@@ -87,11 +79,11 @@ class ChunkRunner {
   PhaseTimer* const timer_;
   Graphs own_graphs_;
   Graphs* const graphs_;
-  uint64_t generation_ = 0;  // RolloutObservations::generation() when graphs were captured
+  uint64_t generation_ = 0;  // RolloutObservations::generation() at capture
   int64_t num_uses_ = 0;
-  std::map<int64_t, Work> works_;  // by chunk size; without graphs a single entry for all sizes
+  std::map<int64_t, Work> works_;  // by chunk size; without graphs a single entry
   Targets targets_;
-  at::Tensor stats_;  // sums over the chunks of a minibatch
+  at::Tensor stats_;  // sums over a minibatch's chunks
 };
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Collects a rollout: the policy drives, and its observations, actions and results are recorded.
+// Collector of a run's rollouts.
 #pragma once
 
 #include <vector>
@@ -10,33 +10,31 @@ namespace pictura {
 
 class Collector {
  public:
-  /// Creates a collector of a run, which must outlive it.
+  /// The run must outlive the collector.
   explicit Collector(Run* run);
 
   /// Fills the run's rollout, except advantages. Returns false after an interrupt (^C). With several ranks, an
   /// interrupt takes effect only after the update.
   bool collect();
-  /// Releases graphs of the simulator's previous worlds.
   void forget_worlds();
 
-  /// Graph launches of all steps so far.
+  /// Graph launches so far.
   int64_t num_graph_launches() const { return graphs_.num_launches(); }
 
  private:
   bool collect_on_stream();
-  // Records the simulator's observations of a step. Returns the slots of the agents that decide, that is, select a new
-  // action.
+  // Returns the slots of the agents that decide (select a new action).
   at::Tensor record(int64_t step);
-  // Repeats the previous step's actions of agents that do not decide.
+  // Repeats the previous actions of the other agents.
   void repeat_held_actions(int64_t step, const at::Tensor& deciding);
-  // Records the teacher's log-probabilities at a step if the teacher's weight is not 0.
+  // Does nothing if the teacher's weight is 0.
   void record_teacher_log_probs(int64_t step, const at::Tensor& slots);
   void simulate(int64_t step);
 
   Run& run_;
   DecisionClock clock_;
   Graphs graphs_;
-  std::vector<RepeatedWork> records_, simulations_;  // [steps] work that writes each step of the rollout
+  std::vector<RepeatedWork> records_, simulations_;  // [steps]
 };
 
 }  // namespace pictura

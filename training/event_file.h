@@ -1,5 +1,5 @@
-// Writer of scalars and configurations for TensorBoard. A file consists of TFRecord records (length, masked CRC-32C,
-// data, masked CRC-32C). Each record contains an Event message of TensorFlow's event.proto, encoded by hand.
+// Writer of TensorBoard event files: TFRecords (length, masked CRC-32C, data, masked CRC-32C) of Event messages
+// (TensorFlow's event.proto).
 #pragma once
 
 #include <fstream>
@@ -14,17 +14,17 @@ namespace pictura {
 
 using Scalars = std::vector<std::pair<std::string, double>>;
 
-/// Keys of a configuration with their values as TOML.
+/// Configuration keys with their values as TOML.
 using Settings = std::vector<std::pair<std::string, std::string>>;
 
 class EventFile {
  public:
   /// Opens folder/events.out.tfevents.<time>.<process>. Throws Error naming the path.
   explicit EventFile(const std::string& folder);
-  /// Appends one event and flushes. Throws Error if the disk is full.
+  /// Appends an event and flushes. Throws Error if the disk is full.
   void write(int64_t step, const Scalars& scalars);
-  /// Appends a run's configuration. Settings that are not lists become hyperparameters on TensorBoard's page HParams;
-  /// `toml` becomes a text. Throws Error if the disk is full.
+  /// Appends a configuration. Settings that are not lists become hyperparameters; `toml` becomes a text. Throws Error
+  /// if the disk is full.
   void write_configuration(const Settings& settings, const std::string& toml);
 
  private:

@@ -1,4 +1,4 @@
-// Training of a policy by self-play. Includes no torch headers.
+// Training by self-play. Includes no torch headers.
 #pragma once
 
 #include <functional>
@@ -13,30 +13,30 @@
 
 namespace pictura {
 
-/// Work and time of one update.
+/// Work and wall time of one update.
 struct UpdateCost {
-  int64_t agent_steps = 0, slot_steps = 0;  // steps of active agents, and of all slots, in the rollout
+  int64_t agent_steps = 0, slot_steps = 0;  // steps of active agents, of all slots
   double kept_fraction = 0;                 // share of valid transitions that the filter keeps
   int64_t minibatches = 0;
-  double first_kl = 0;                 // KL divergence due to rounding, in the first minibatch before parameters change
-  double rollout_s = 0, update_s = 0;  // wall times of the rollout and of the update
-  PhaseSeconds phases_s{};             // times of the phases of rollout and update
+  double first_kl = 0;  // KL divergence due to rounding, before parameters change
+  double rollout_s = 0, update_s = 0;
+  PhaseSeconds phases_s{};
 };
 
-/// Progress of a run, given to on_progress after every update.
+/// Progress of a run after an update.
 struct TrainProgress {
   int64_t update = 0, updates = 0;
   int64_t agent_steps = 0;
-  double agent_steps_per_s = 0;         // since the run began or was resumed
+  double agent_steps_per_s = 0;         // since start or resumption
   double recent_agent_steps_per_s = 0;  // over the last minute
-  double episode_return = 0;            // mean over agent episodes that ended in the last updates; NaN before the first
-  double eta_s = 0;              // time until train.updates, the schedule or `minutes` ends, whichever comes first
-  bool ends_by_minutes = false;  // whether the end of `minutes` comes first; eta_s is then an upper bound
-  Scalars scalars;               // values logged for this update, as in progress.csv
-  UpdateCost cost;               // cost of this update
+  double episode_return = 0;            // mean over agent episodes of the last updates; NaN if none ended
+  double eta_s = 0;                     // until train.updates, the schedule or `minutes` ends
+  bool ends_by_minutes = false;         // `minutes` ends first; eta_s is then an upper bound
+  Scalars scalars;                      // logged values, as in progress.csv
+  UpdateCost cost;
 };
 
-/// Treatment of an existing run in the folder.
+/// Treatment of a run that the folder already holds.
 enum class OldRun {
   refuse,
   resume,     // continue from its checkpoint
@@ -44,16 +44,16 @@ enum class OldRun {
 };
 
 struct TrainOptions {
-  std::string config_path;             // TOML, see docs/reference/configuration.md for every key
-  std::vector<std::string> overrides;  // for instance "train.updates=2"
+  std::string config_path;             // TOML, see docs/reference/configuration.md
+  std::vector<std::string> overrides;  // such as "train.updates=2"
   std::string out_folder;
   OldRun old_run = OldRun::refuse;
-  std::string init_from;  // checkpoint or safetensors of the same network, from which only weights are read
-  double minutes = 0;     // wall-time limit, start-up included; the last update ends before it; 0: none
-  std::string commit;     // commit of this program, for the metadata of policy.safetensors
-  Launch launch;          // place of this process among the processes that train together
-  std::function<void(const TrainProgress&)> on_progress;  // called by rank 0 only, as is on_notice
-  std::function<void(const std::string&)> on_notice;      // receives messages that are not errors
+  std::string init_from;  // checkpoint or safetensors, from which only weights are read
+  double minutes = 0;     // wall-time limit, start-up included; 0: none
+  std::string commit;     // commit of this program, for metadata
+  Launch launch;
+  std::function<void(const TrainProgress&)> on_progress;  // called only by rank 0, like on_notice
+  std::function<void(const std::string&)> on_notice;      // for messages that are not errors
 
   void notify(const std::string& notice) const {
     if (on_notice) on_notice(notice);
@@ -65,38 +65,35 @@ struct TrainReport {
   int64_t agent_steps = 0, updates = 0;
   double agent_steps_per_s = 0, episode_return = 0, km_driven = 0;
   int ranks = 1;
-  double evaluation_s = 0;  // time of this process in evaluations (train.evaluate_every); rates exclude it
+  double evaluation_s = 0;  // time of this process in evaluations, which rates exclude
   bool interrupted = false, out_of_time = false;
   std::string checkpoint, policy_hash;
-  // Memory of a CUDA device, else 0. device_bytes: bytes that all processes use after the last update, including
-  // torch's cache. peak_tensor_bytes: peak memory of tensors.
+  // CUDA device memory of all processes after the last update, and peak memory of tensors; 0 on the host.
   int64_t device_bytes = 0, peak_tensor_bytes = 0;
-  std::string device, simulator, renderer;  // names; `renderer` is empty without images
+  std::string device, simulator, renderer;  // `renderer` is empty without images
 };
 
-/// Error thrown if the tensors of a run do not fit into the device's memory; a smaller train.forward_chunk may fit.
+/// Error of tensors that do not fit into the device's memory; a smaller train.forward_chunk may fit.
 class OutOfMemory : public Error {
  public:
   using Error::Error;
 };
 
-/// Trains with the given configuration. Writes the following files into out_folder:
+/// Trains a policy, and writes into out_folder:
 /// - config.toml: the resolved configuration
 /// - untrained.ckpt: the policy before its first update
 /// - checkpoint.ckpt, older checkpoints (train.keep_checkpoints) and milestones (train.milestone_agent_steps)
 /// - policy.safetensors, and policy_average.safetensors if train.weight_average is set
 /// - progress.csv, evaluation.csv if train.evaluate_every is set, and TensorBoard events
 ///
-/// After an interrupt (common/support/interrupt.h) the function saves and returns with `interrupted`. It returns with
-/// `out_of_time` if another update would not end within `minutes`. The expected duration is 1.2 times that of the
-/// longest update of this process. Before the first update, the longest update of an earlier process counts instead if
-/// that process had equally many agents and a device of the same product. Throws Error naming file and key for bad
-/// input. Throws Error naming the folder if another run is active in it, or if it holds a run and old_run is `refuse`.
-/// Throws OutOfMemory if the device's memory is too small.
+/// After an interrupt (common/support/interrupt.h) it saves and returns with `interrupted`. It returns with
+/// `out_of_time` if another update might not end within `minutes` (training/run_time.h). Throws Error naming file and
+/// key for bad input. Throws Error naming the folder if another run is active in it, or if it holds a run and old_run
+/// is `refuse`. Throws OutOfMemory if the device's memory is too small.
 ///
-/// Several processes train one policy if each calls this function with its `launch` and equal settings. Rank 0 alone
-/// reads and writes files. An interrupt of one process ends all processes after the same update. If a rank fails, ends
-/// or hangs, all processes throw Error naming that rank.
+/// Several processes train one policy if each calls this function with its `launch` and equal settings. Only rank 0
+/// reads and writes files. An interrupt ends all processes after the same update. If a rank fails, ends or hangs, all
+/// processes throw Error naming it.
 TrainReport train(const TrainOptions& options);
 
 }  // namespace pictura

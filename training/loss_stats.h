@@ -1,19 +1,19 @@
-// Statistics of an update's losses by name: tensors during computation, numbers in logs.
+// Statistics of losses: as tensors during an update, as numbers in logs.
 #pragma once
 
 #include <ATen/ATen.h>
 
 namespace pictura {
 
-/// Statistics of a minibatch, or their means over several minibatches; docs/reference/run_folder.md defines them.
+/// Statistics of a minibatch, or means over minibatches; docs/reference/run_folder.md defines them.
 template <typename Number>
 struct LossStatsOf {
   Number policy_loss{}, value_loss{};
-  Number teacher_kl{};  // KL divergence from the teacher's actions, not multiplied by its weight
+  Number teacher_kl{};  // not multiplied by its weight
   Number entropy{}, approx_kl{}, clip_fraction{}, abs_log_ratio{};
   Number grad_norm{};  // before clipping
 
-  /// Calls f(name, statistic) for the statistics of the action distribution, which are also logged per epoch.
+  /// Visits the action distribution's statistics, which are also logged per epoch.
   template <typename Stats, typename F>
   static void visit_actions(Stats& stats, const F& f) {
     f("entropy", stats.entropy);
@@ -21,7 +21,7 @@ struct LossStatsOf {
     f("clip_fraction", stats.clip_fraction);
     f("abs_log_ratio", stats.abs_log_ratio);
   }
-  /// Calls f(name, statistic) for the statistics of a forward pass: all but the gradient norm.
+  /// Visits all statistics except the gradient norm.
   template <typename Stats, typename F>
   static void visit_losses(Stats& stats, const F& f) {
     f("policy_loss", stats.policy_loss);
@@ -29,7 +29,6 @@ struct LossStatsOf {
     f("teacher_kl", stats.teacher_kl);
     visit_actions(stats, f);
   }
-  /// Calls f(name, statistic) for all statistics.
   template <typename Stats, typename F>
   static void visit(Stats& stats, const F& f) {
     visit_losses(stats, f);
@@ -41,15 +40,14 @@ using LossStats = LossStatsOf<double>;
 using LossTensors = LossStatsOf<at::Tensor>;
 constexpr int64_t kNumLossStats = sizeof(LossStats) / sizeof(double);
 
-/// Returns the statistics of a forward pass as a row, f64 [kNumLossStats - 1], in the order of visit_losses().
+/// Returns a row of statistics, f64 [kNumLossStats - 1], in the order of visit_losses().
 inline at::Tensor stacked(const LossTensors& stats) {
   std::vector<at::Tensor> values;
   LossTensors::visit_losses(stats, [&values](const char*, const at::Tensor& value) { values.push_back(value); });
   return at::stack(values).detach().to(at::kDouble);
 }
 
-/// Returns views of the elements of a row that holds all statistics. The row is [kNumLossStats], in the order of
-/// visit().
+/// Returns views of the elements of a row [kNumLossStats], in the order of visit().
 inline LossTensors elements_of(const at::Tensor& row) {
   LossTensors elements;
   int64_t i = 0;
@@ -57,7 +55,7 @@ inline LossTensors elements_of(const at::Tensor& row) {
   return elements;
 }
 
-/// Returns the numbers of a row of all statistics. The row must be on the host.
+/// Converts a row of all statistics, on the host.
 inline LossStats numbers_of(const at::Tensor& row) {
   LossStats numbers;
   const double* next = row.const_data_ptr<double>();

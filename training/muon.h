@@ -1,6 +1,5 @@
-// Muon (Jordan et al., 2024), an optimizer for the weights of hidden layers. It makes the momentum of each weight
-// matrix orthogonal before each step. Steps are scaled as in Liu et al., "Muon is scalable for LLM training" (2025), so
-// that AdamW's learning rates and weight decay apply unchanged.
+// Muon (Jordan et al., 2024), an optimizer that makes the momentum of each weight matrix orthogonal. Steps are scaled
+// to fit AdamW's learning rates and weight decay (Liu et al., "Muon is scalable for LLM training", 2025).
 #pragma once
 
 #include <vector>
@@ -10,43 +9,40 @@
 
 namespace pictura {
 
-/// Returns whether Muon updates a parameter. Muon updates the weights of hidden layers. AdamW updates biases, norms,
-/// queries, layers that read positions or pixels, and the two heads.
+/// Whether Muon updates a parameter: a weight of a hidden layer. AdamW updates biases, norms, queries, layers that read
+/// positions or pixels, and heads.
 bool is_stepped_by_muon(const NamedTensor& parameter);
 
-/// Root mean squares of the weights for which is_stepped_by_muon() is true, also in runs without Muon. all: over all
-/// these weights. largest: maximum over matrices. Both are 0 without such weights.
+/// Root mean squares of the weights that is_stepped_by_muon() selects: over all, and the maximum over matrices. Both
+/// are 0 without such weights.
 struct WeightRms {
   double all = 0, largest = 0;
 };
-/// Returns the root mean squares of these parameters. Waits for their device.
+/// Waits for the parameters' device.
 WeightRms weight_rms(const std::vector<NamedTensor>& parameters);
 
-/// Returns matrices [n, rows, columns] with the singular vectors of `matrices` and singular values near 1. Computes
-/// them by five Newton-Schulz steps in `type`. Singular values of at least 1/200 of the Frobenius norm become 0.7 to
-/// 1.2. A zero matrix stays zero.
+/// Returns matrices [n, rows, columns] with the singular vectors of `matrices` and singular values near 1. Uses five
+/// Newton-Schulz steps in `type`. Singular values of at least 1/200 of the Frobenius norm become 0.7 to 1.2; zero
+/// matrices stay zero.
 at::Tensor orthogonalized(const at::Tensor& matrices, at::ScalarType type);
 
 class Muon {
  public:
-  /// Creates the optimizer. weights: f32 leaves with gradients, [out, ...], on `device`; each is stepped as the matrix
-  /// [out, rest]. type: data type of matrix products. uses_graphs: whether each step is launched as one CUDA graph; the
-  /// current stream must then be one that can be captured.
+  /// weights: f32 leaves with gradients, [out, ...], treated as matrices [out, rest]. type: type of matrix products.
+  /// uses_graphs: captures steps; the current stream must then not be the default stream.
   Muon(std::vector<at::Tensor> weights, at::ScalarType type, double weight_decay, Device device = {},
        bool uses_graphs = false);
 
-  /// Takes one step along the weights' gradients. failed: f32 scalar; if it is not 0, neither weights nor momentum
-  /// change, whatever the gradients are. Does not wait for the device.
+  /// Takes one step without waiting for the device. failed: f32 scalar; if it is not 0, nothing changes.
   void step(double learning_rate, const at::Tensor& failed);
-  /// Discards the captured graph. Must be called if the addresses of gradients change.
+  /// Call it after gradients move in memory.
   void discard_graph();
 
-  /// Returns the momentum of weight i, in the shape of the weight.
+  /// Momentum of weight i, shaped like the weight.
   at::Tensor momentum(size_t i) const { return parts_of(momentum_)[i]; }
 
  private:
-  // Matrices that are multiplied in one batch: padded with zeros to one size, and transposed if they are taller than
-  // wide.
+  // Matrices for one batched product: padded with zeros, and transposed if taller than wide.
   struct Batch {
     int64_t rows = 0, columns = 0;
     std::vector<size_t> weights;
@@ -55,7 +51,6 @@ class Muon {
   void take_step();
   static std::vector<Batch> make_batches(const std::vector<at::Tensor>& weights);
   void index_batches();
-  // Splits a vector of all weights' elements into tensors of the weights' shapes.
   std::vector<at::Tensor> parts_of(const at::Tensor& flat) const;
 
   std::vector<at::Tensor> weights_;
@@ -63,11 +58,10 @@ class Muon {
   const double weight_decay_;
   at::Tensor momentum_;  // [elements of all weights]
   std::vector<Batch> batches_;
-  // Index of each batch element in a vector of all weights' elements (for padding, the vector's size), and the inverse
-  // mapping.
+  // Index in momentum_ of each batch element (for padding: the size of momentum_), and the inverse.
   at::Tensor element_of_place_, place_of_element_;
-  std::vector<at::Tensor> scales_;  // [batches], each [weights, 1, 1]: factors of the weights' steps
-  at::Tensor rate_, failed_;        // f32 scalars of this step
+  std::vector<at::Tensor> scales_;  // [batches], each [weights, 1, 1]: factors of steps
+  at::Tensor rate_, failed_;
   Graphs graphs_;
   RepeatedWork step_;
 };

@@ -1,5 +1,4 @@
-// Opponents: saved policies that drive shares of a run's agents. Each opponent reads the observations with which it was
-// trained. The learner does not learn from the agents of opponents.
+// Opponents: saved policies that drive shares of a run's agents. The learner does not learn from these agents.
 #pragma once
 
 #include <memory>
@@ -15,25 +14,23 @@ namespace pictura {
 
 class Opponents {
  public:
-  /// Creates the opponents of simulator.others.policies, on `device`, with the precision of the run. Throws Error
-  /// naming a file if it contains no policy, or if its policy reads auxiliary slots (observed numbers that no image
-  /// shows) that the learner must not have. Also throws if its policy repeats an action for a number of steps that does
-  /// not divide train.num_steps.
+  /// Reads the policies of simulator.others.policies. Throws Error naming a file that contains no policy. Throws Error
+  /// if a policy has auxiliary slots that the learner must not have. Throws Error if a policy's decision steps do not
+  /// divide train.num_steps.
   Opponents(const Config& config, Device device, Communicator* communicator);
   ~Opponents();
   Opponents(const Opponents&) = delete;
   Opponents& operator=(const Opponents&) = delete;
 
-  /// Adds to a simulator's configuration the observation arrays that the opponents read.
+  /// Adds the observation arrays that opponents read.
   void add_arrays(SimulatorConfig* config_inout) const;
   /// Prepares to drive in the run's simulator, which must outlive this object.
   void enter(const Simulator& simulator);
 
-  /// Returns a mask of the agents that the learner drives in the simulator's current state, u8 [slots].
+  /// Mask of the agents that the learner now drives, u8 [slots].
   at::Tensor own_slots(const SimulatorArrays& input) const;
-  /// Returns the commands of all agents, [slots]. The learner's agents take `own_actions`, [slots]; opponents' agents
-  /// take actions that the opponents draw. A later call overwrites the result. On a GPU, waits until the host has read
-  /// the number of each opponent's agents.
+  /// Returns the commands of all agents, [slots], until the next call. The learner's agents take `own_actions`,
+  /// [slots]; opponents draw actions for the others. On a GPU, waits to read the number of each opponent's agents.
   Span<const Command> commands(const SimulatorArrays& input, Span<const int32_t> own_actions, PolicyExecutor* executor);
 
  private:

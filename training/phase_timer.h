@@ -1,5 +1,4 @@
-// Measures the time of an update by phase: with a clock on the host, and with CUDA events on a GPU. Measuring does not
-// wait for the GPU.
+// Time of an update by phase, measured by a host clock or by CUDA events, without waiting for the GPU.
 #pragma once
 
 #include <memory>
@@ -13,13 +12,13 @@
 
 namespace pictura {
 
-/// Timer of the phases of one device.
+/// Timer of one device.
 class PhaseTimer {
  public:
   explicit PhaseTimer(Device device) : device_(device) {}
 
-  /// Scope whose lifetime counts as time of a phase. With a null timer nothing is measured. Scopes must not nest. In
-  /// NVIDIA's profilers each scope is an NVTX range with the phase's name.
+  /// Scope whose lifetime counts as time of a phase; a null timer measures nothing. Scopes must not nest. Each scope is
+  /// an NVTX range in NVIDIA's profilers.
   class Scope {
    public:
     Scope(PhaseTimer* timer, Phase phase);
@@ -30,11 +29,11 @@ class PhaseTimer {
    private:
     PhaseTimer* timer_;
     Phase phase_;
-    size_t begin_ = 0;  // on a GPU: index of the scope's first event
+    size_t begin_ = 0;  // first event, on a GPU
     Stopwatch watch_;
   };
 
-  /// Returns the seconds of each phase since the last call. Waits for the device.
+  /// Returns each phase's seconds since the last call. Waits for the device.
   PhaseSeconds take();
 
  private:
@@ -42,7 +41,6 @@ class PhaseTimer {
     Phase phase;
     size_t begin, end;
   };
-  /// Records an event and returns its index.
   size_t record();
 
   Device device_;

@@ -1,4 +1,4 @@
-// Phases into which the time of an update is divided.
+// Phases of an update.
 #pragma once
 
 #include <array>
@@ -7,10 +7,9 @@
 
 namespace pictura {
 
-/// Phase of an update. simulate: the simulator's steps; render: images, wherever they are needed; forward: the network
-/// in rollouts; learn: the network and its losses in updates; diagnose: gradients of single losses, for the log only;
-/// backward: gradients of the loss that is minimised; optimize: the optimizer's steps. The rest of the wall time
-/// belongs to no phase.
+/// Phase of an update; the rest of the wall time belongs to none. simulate: the simulator; render: all images; forward:
+/// the network in rollouts; learn: the network and losses in updates; diagnose: gradients of single losses for the log;
+/// backward: gradients of the total loss; optimize: the optimizer.
 enum class Phase : uint8_t { simulate, render, forward, learn, diagnose, backward, optimize };
 constexpr size_t kNumPhases = 7;
 constexpr const char* kPhaseNames[kNumPhases] = {"simulate", "render",   "forward", "learn",

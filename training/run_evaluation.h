@@ -1,6 +1,4 @@
-// Small evaluation within a run: the protocol of evaluation/ in a few worlds on the training maps. It draws with the
-// run's own renderer, or with a separate renderer if the run's renderer randomizes cameras. It shares no state with
-// training, which continues as if there had been no evaluation.
+// Small evaluation on a run's training maps, which changes no state of training.
 #pragma once
 
 #include <optional>
@@ -13,15 +11,13 @@ namespace pictura {
 
 class RunEvaluation {
  public:
-  /// Creates the evaluation of a run, which must outlive it.
+  /// The run must outlive the evaluation.
   explicit RunEvaluation(const Run& run);
 
-  /// Whether an evaluation is due after the run's completed updates.
+  /// Whether an evaluation is due after the completed updates.
   bool is_due() const;
-  /// Evaluates in train.evaluate_scenarios worlds of train.evaluate_agents agents for train.evaluate_steps steps. The
-  /// result equals that of `pictura evaluate` on the checkpoint, with these numbers as --scenarios, --agents and
-  /// --steps. If the run averages weights, average_row equals the result with --average. The result is empty after an
-  /// interrupt.
+  /// Evaluates as train.evaluate_* specify; empty after an interrupt. The result equals that of `pictura evaluate` on
+  /// the checkpoint with equal --scenarios, --agents and --steps; average_row equals that with --average.
   std::optional<EvaluationRecord> evaluate();
 
  private:

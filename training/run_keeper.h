@@ -1,4 +1,4 @@
-// Folder of a training run, with its checkpoints and weights. The run owns the folder while it is active.
+// Folder of an active run.
 #pragma once
 
 #include <functional>
@@ -14,31 +14,29 @@
 
 namespace pictura {
 
-/// Keeper of a run's folder. Only rank 0 reads and writes. Every rank must call each function, because a checkpoint
-/// contains data of each rank.
+/// Owner of a run's folder, with its checkpoints and weights. Only rank 0 reads and writes. Every rank must call each
+/// function, because a checkpoint contains data of each rank.
 class RunKeeper {
  public:
-  /// Claims the folder for this process. Throws Error naming the folder if another run is active in it, or if it holds
-  /// a run and options.old_run is `refuse`. Throws Error naming a run's file that is a link. The arguments must outlive
-  /// the object.
+  /// Claims the folder. Throws Error about the folder as train() does, and Error naming a file of the run that is a
+  /// link. The arguments must outlive the object.
   RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* communicator);
 
-  /// Starts the run as the options specify: from its last checkpoint, from the weights of another run, or from new
-  /// weights. In the last case it also saves the untrained policy. A run that is overwritten stays until the first
-  /// save(). Returns the recent updates, over which the log averages returns.
+  /// Starts the run from its last checkpoint, another run's weights, or new weights, as the options specify. An
+  /// overwritten run stays until the first save(). Returns the recent updates for the log.
   std::vector<RecentUpdate> begin(Run* run);
 
-  /// Whether the configuration asks for a checkpoint after the run's latest update.
+  /// Whether the configuration asks for a checkpoint now.
   bool is_due(const Run& run) const;
-  /// Saves the run as checkpoint.ckpt and keeps older checkpoints. Does nothing if this update is already saved.
+  /// Saves checkpoint.ckpt and keeps older ones, unless this update is already saved.
   void save(const Run& run, const std::vector<RecentUpdate>& recent);
-  /// Saves the run under another name in the folder. Later saves do not touch this file.
+  /// Saves under another name, which later saves do not touch.
   void save_as(const std::string& name, const Run& run, const std::vector<RecentUpdate>& recent) const;
-  /// Writes the weights as policy.safetensors, and their average, if there is one, as policy_average.safetensors.
+  /// Writes policy.safetensors, and policy_average.safetensors if the run averages weights.
   void write_weights(const Run& run) const;
 
-  /// Returns the folder of the run's files, which is options.out_folder. If the run overwrites another run, it is a
-  /// folder within options.out_folder until the first checkpoint.
+  /// Folder of the files: options.out_folder, or a folder within it until the first save of a run that overwrites
+  /// another.
   const std::string& folder() const { return folder_; }
   std::string path(const std::string& name) const { return folder_ + "/" + name; }
   std::string checkpoint_path() const { return path("checkpoint.ckpt"); }

@@ -1,5 +1,4 @@
-// Time of a run: durations of its updates and evaluations on this machine, and whether another update or evaluation
-// would end within the run's time limit.
+// Time limit of a run.
 #pragma once
 
 #include <string>
@@ -14,18 +13,15 @@ enum class RunWork { update, evaluation };
 
 class RunTime {
  public:
-  /// Limits the run to `minutes` of wall time since `start`; 0: no limit. Durations are stored in
-  /// Run::longest_update_s, by device and number of agents; the run must outlive this object. If the run used the same
-  /// device and number of agents before, durations are known from the start.
+  /// minutes: limit of wall time since `start`; 0: none. Durations are in Run::longest_update_s, also those of earlier
+  /// processes on equal devices with equally many agents. The run must outlive this object.
   RunTime(double minutes, const Stopwatch& start, Run* run);
 
-  /// Returns whether another update or evaluation would exceed the limit on any rank, if it took 20 % more time than
-  /// the longest so far. Collective: every rank must call it.
+  /// Whether further work would exceed the limit on any rank if it took 1.2 times the longest duration so far.
+  /// Collective: every rank must call it.
   bool would_exceed_limit(RunWork work) const;
-  /// Records the duration of one update or evaluation.
   void add(RunWork work, double seconds);
-  /// Multiplies the expected durations of updates and evaluations by `times`. The next update's duration replaces the
-  /// expected duration of updates.
+  /// Multiplies expected durations by `times`. The next update's duration replaces that of updates.
   void scale_expected_duration(double times);
   /// Limits progress->eta_s to the remaining time.
   void limit_eta(TrainProgress* progress) const;

@@ -9,16 +9,14 @@
 
 namespace pictura {
 
-/// Chooses random worlds that together have simulator.num_slots slots over all ranks. Their map indices refer to
-/// training_maps(). Worlds of recorded scenes have simulator.max_agents agents each; SceneSets has their maps.
+/// Draws worlds with simulator.num_slots slots over all ranks. Their map indices refer to training_maps(), except in
+/// recorded scenes, whose maps SceneSets has.
 std::vector<WorldSpec> draw_training_worlds(const Config& config);
 
-/// Returns the configuration of the worlds of draw_training_worlds(): simulator_config(), with the protocol's settings
-/// for recorded scenes.
+/// Returns simulator_config(), with the protocol's settings for recorded scenes.
 SimulatorConfig training_world(const Config& config, Device device);
 
-/// Returns the names of the training maps, for load_maps(): first simulator.maps, then their copies
-/// (simulator.map_copies), without copies that no world uses.
+/// Returns names for load_maps(): simulator.maps, then copies (simulator.map_copies) that worlds use.
 std::vector<std::string> training_maps(const Config& config);
 
 }  // namespace pictura

@@ -1,5 +1,5 @@
-// Ranks: the processes of a training run. They meet in a key-value store. Each rank writes heartbeats and its progress
-// to the store, and detects there whether other ranks ended or hang. Joint computations use a Communicator.
+// Ranks: the processes of a training run. They exchange heartbeats through a key-value store, and detect that a rank
+// ends or hangs.
 #pragma once
 
 #include <atomic>
@@ -25,17 +25,17 @@ class RankLost : public Error {
 
 /// Time limits for other ranks.
 struct RankTimeouts {
-  double join_s = 300;        // maximum time until all ranks have joined
-  double silent_s = 20;       // time without a heartbeat: the process was killed or stopped, or its host failed
-  double no_progress_s = 45;  // time with heartbeats but no step: the rank hangs; see Ranks::set_no_progress_s()
+  double join_s = 300;        // until all ranks have joined
+  double silent_s = 20;       // without a heartbeat: the process was killed or stopped
+  double no_progress_s = 45;  // with heartbeats but no step: the rank hangs
 };
 
 class Ranks {
  public:
-  /// Waits until all ranks have joined. Throws Error naming address and port if they cannot meet. Throws Error naming
-  /// ranks that did not join, or a rank that two processes claim.
+  /// Waits until all ranks have joined. Throws Error if they cannot meet, if ranks did not join, or if two processes
+  /// claim a rank.
   explicit Ranks(const Launch& launch, const RankTimeouts& timeouts = {});
-  /// Waits briefly for the other ranks if this process hosts the store.
+  /// Waits briefly for other ranks if this process hosts the store.
   ~Ranks();
   Ranks(const Ranks&) = delete;
   Ranks& operator=(const Ranks&) = delete;
@@ -44,21 +44,20 @@ class Ranks {
   int rank() const { return launch_.rank; }
   int size() const { return launch_.size; }
 
-  /// Counts a step of this process. All ranks must take equally many steps. Throws RankLost, naming the rank, if a rank
-  /// is lost.
+  /// Counts a step; all ranks must take equally many. Throws RankLost, naming the rank, if a rank is lost.
   void step();
-  /// Throws RankLost as step() does, without counting a step.
+  /// Throws as step() does, without counting a step.
   void check() const;
-  /// Call it after a collective operation has failed. Waits until the lost rank is identified, and throws RankLost.
-  /// Returns if no rank is lost.
+  /// Call it after a failed collective operation. Throws RankLost as soon as the lost rank is known; returns if none is
+  /// lost.
   void throw_if_lost() const;
-  /// Announces to the other ranks why this process ends. Only the first announcement counts.
+  /// Announces to other ranks why this process ends. Only the first call counts.
   void announce(const std::string& why) noexcept;
 
-  /// Sets the time without a step after which a rank is considered to hang. Runs with long steps need a longer time.
+  /// Runs with long steps need a longer time than the default.
   void set_no_progress_s(double seconds) { no_progress_s_ = seconds; }
 
-  /// Scope of long work: within it, this process is not considered to hang even if it takes no step.
+  /// Scope in which this process does not count as hanging.
   class LongWork {
    public:
     explicit LongWork(Ranks* ranks) : ranks_(ranks) { ++ranks_->busy_; }
@@ -70,14 +69,13 @@ class Ranks {
     Ranks* ranks_;
   };
 
-  /// Returns every rank's text `own`, in the order of ranks. Each key can be used only once. Collective: every rank
-  /// must call it.
+  /// Returns every rank's text, in the order of ranks. Each key can be used once. Collective: every rank must call it.
   std::vector<std::string> texts(const std::string& key, const std::string& own);
 
   /// Store for process groups; null with a single rank.
   const c10::intrusive_ptr<c10d::Store>& store() const { return store_; }
-  /// Sets the function that is called from another thread when a rank is lost, so that waiting calls end. It replaces
-  /// the previous function; an empty function removes it.
+  /// Sets the function that another thread calls when a rank is lost, to end waiting calls; an empty function removes
+  /// it.
   void on_lost(std::function<void()> abort);
 
  private:
@@ -87,7 +85,7 @@ class Ranks {
 
   const Launch launch_;
   const RankTimeouts timeouts_;
-  c10::intrusive_ptr<c10d::Store> store_, watch_store_;  // watch_store_ is used by the watching thread only
+  c10::intrusive_ptr<c10d::Store> store_, watch_store_;
   std::atomic<double> no_progress_s_;
   std::atomic<int64_t> steps_ = 0;
   std::atomic<int> busy_ = 0;

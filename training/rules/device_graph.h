@@ -1,12 +1,11 @@
-// Graphs of work on a CUDA device, launched as a whole instead of call by call.
+// Captured work on a CUDA device.
 #pragma once
 
 #include "pictura/common/device.h"
 
 namespace pictura {
 
-/// CUDA graph of calls that were captured on a stream. The calls keep the addresses and arguments that they had at
-/// capture.
+/// CUDA graph of captured calls, which keep the addresses and arguments of the capture.
 class DeviceGraph {
  public:
   DeviceGraph() = default;
@@ -14,7 +13,7 @@ class DeviceGraph {
   DeviceGraph(const DeviceGraph&) = delete;
   DeviceGraph& operator=(const DeviceGraph&) = delete;
 
-  /// Launches the graph on a stream. Throws Error if the device fails.
+  /// Throws Error if the device fails.
   virtual void launch(Stream stream) = 0;
 };
 

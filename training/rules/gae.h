@@ -1,6 +1,4 @@
-// Generalized advantage estimation (Schulman et al., 2016) with next-step autoreset, for actions that may be held for
-// several steps. gae_advantage() is one step of a recursion over a slot's steps, from the last to the first. Callers
-// loop over slots and steps.
+// Generalized advantage estimation (Schulman et al., 2016) with next-step autoreset and actions held for several steps.
 #pragma once
 
 #include "pictura/common/span.h"
@@ -9,25 +7,25 @@ namespace pictura {
 
 /// One step of one agent.
 /// - A terminated step does not bootstrap.
-/// - A truncated step bootstraps from the value of the next row, which belongs to the final observation. The next step
-///   is not valid: the world is reset, or the slot waits for a new agent. No advantage crosses the end of an episode.
+/// - A truncated step bootstraps from the next row's value, that of the final observation. The next step is not valid,
+///   so no advantage crosses the end of an episode.
 /// - An invalid step (such as one of a halted agent) has the advantage 0. Earlier steps bootstrap from its value.
-/// - A step without a decision continues the previous step's action. It has the advantage 0, and its reward is part of
-///   the return of the last decision.
+/// - A step without a decision continues the previous action. It has the advantage 0; its reward belongs to the last
+///   decision.
 struct GaeTransition {
   float reward, value, next_value;
   bool is_terminated, is_truncated, is_valid, is_decision;
 };
 
-/// Result of the recursion over all steps after a given step. value: discounted rewards up to the next decision, plus
-/// the value there. advantage: discounted advantage of that decision.
+/// Result of the recursion over later steps. value: discounted rewards up to the next decision, plus the value there.
+/// advantage: that decision's discounted advantage.
 struct GaeTail {
   float value = 0, advantage = 0;
 };
 
-/// Returns the advantage of a step's decision; 0 if the step has no decision. tail_inout: on entry the tail after this
-/// step, on return the tail after the previous step. Each step discounts by gamma, each decision by gae_lambda. The
-/// return of an action held for k steps is the sum of gamma^i r_i, bootstrapped with gamma^k.
+/// Returns the advantage of a step's decision; 0 without a decision. Call it for a slot's steps from the last to the
+/// first. Each step discounts by gamma, each decision by gae_lambda. So an action held for k steps has the return sum
+/// of gamma^i r_i, bootstrapped with gamma^k. tail_inout: tail after this step; on return, after the previous step.
 PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float gamma, float gae_lambda,
                                       GaeTail* tail_inout) {
   const bool goes_on = !transition.is_terminated && !transition.is_truncated;
@@ -48,7 +46,7 @@ PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float gam
   return advantage;
 }
 
-/// Arrays of a rollout, [steps, slots] each, except `values`, which has one more step.
+/// Arrays of a rollout, [steps, slots]; `values` has one more step.
 struct TransitionArrays {
   Span<const float> rewards, values;
   Span<const uint8_t> terminated, truncated, valid;
@@ -60,7 +58,6 @@ struct TransitionArrays {
     return {rewards[i],        values[i],     values[i + static_cast<size_t>(num_slots)], terminated[i] != 0,
             truncated[i] != 0, valid[i] != 0, decides.empty() || decides[i] != 0};
   }
-  /// Returns the tail after the last step.
   PICTURA_HD GaeTail tail(int64_t slot) const { return {values[num_steps * num_slots + slot], 0.0f}; }
 };
 

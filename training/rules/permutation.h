@@ -1,13 +1,13 @@
-// Order of an epoch's transitions: a permutation computed one element at a time, so that any number of threads, devices
-// or ranks can each compute their part.
+// Order of an epoch's transitions. Each element is computed on its own, so threads, devices and ranks can share the
+// work.
 #pragma once
 
 #include "pictura/common/rng.h"
 
 namespace pictura {
 
-/// Permutation of [0, size) by a Feistel network (Luby and Rackoff, 1988). The network permutes numbers with an even
-/// number of bits, and its rounds draw random bits from Philox. It is repeated until the result is below size.
+/// Permutation of [0, size) by a Feistel network (Luby and Rackoff, 1988) that draws bits from Philox. The network
+/// permutes an even number of bits, and repeats until the result is below size.
 struct Permutation {
   uint64_t seed = 0;
   uint32_t update = 0, epoch = 0;
@@ -22,7 +22,7 @@ struct Permutation {
     while ((int64_t{1} << (2 * half_bits)) < size) ++half_bits;
   }
 
-  /// Returns the permuted position of element i, in [0, size). Needs fewer than four repetitions on average.
+  /// Returns the position of element i. Needs fewer than four repetitions on average.
   PICTURA_HD int64_t operator()(int64_t i) const {
     auto element = static_cast<uint64_t>(i);
     do element = encrypted(element);
