@@ -1,6 +1,5 @@
-// Splits a batch into chunks that pass through the network one after the other. All chunks of a batch have the same
-// size. On a device, sizes are rounded so that few different sizes occur, although the number of active agents varies.
-// So cuDNN's plans and CUDA graphs, which depend on the size, are rarely rebuilt.
+// Splits a batch into chunks of equal size for the network. On a device, only few different sizes occur. So cuDNN's
+// plans and CUDA graphs are rarely rebuilt when the number of active agents changes.
 #pragma once
 
 #include <algorithm>
@@ -12,14 +11,14 @@ namespace pictura {
 /// Chunk sizes on a device are multiples of this number, or the maximum size.
 constexpr int64_t kChunkGranule = 256;
 
-/// Sizes of the chunks of a batch: equal parts of at most `max_size` rows. With `are_full`, every chunk has `max_size`
-/// rows, so that results do not depend on the batch size.
+/// Chunks of at most `max_size` rows. `are_full`: exactly `max_size` rows, so that results do not depend on the batch
+/// size.
 struct ChunkSizes {
   int64_t max_size = 1;
   bool are_full = false;
 };
 
-/// Returns the size of each chunk of a batch of `count` rows.
+/// Returns the chunk size for `count` rows.
 inline int64_t chunk_size(int64_t count, const ChunkSizes& sizes, bool on_device) {
   const int64_t max_size = sizes.max_size;
   if (sizes.are_full) return max_size;
@@ -28,20 +27,20 @@ inline int64_t chunk_size(int64_t count, const ChunkSizes& sizes, bool on_device
   return std::min(max_size, (equal + granule - 1) / granule * granule);
 }
 
-/// Elements [begin, begin + count) of a batch. `rows`, i64 [chunk size], are their row numbers followed by padding.
-/// Padding repeats the batch's first element; its results must be discarded.
+/// Elements [begin, begin + count) of a batch. rows: i64 [chunk size], row numbers, then padding. Padding repeats the
+/// batch's first element; its results must be discarded.
 struct Chunk {
   at::Tensor rows;
   int64_t begin = 0, count = 0;
 
   int64_t size() const { return rows.size(0); }
-  /// Returns the chunk's elements of an array over the batch, padded with zeros.
+  /// Returns the chunk's elements of an array, padded with zeros.
   at::Tensor take(const at::Tensor& of_batch) const {
     return at::constant_pad_nd(of_batch.narrow(0, begin, count), {0, size() - count});
   }
 };
 
-/// Calls f(const Chunk&) for all chunks of a batch of rows, i64 [n].
+/// Calls f(const Chunk&) for all chunks of rows, i64 [n].
 template <typename F>
 void for_each_chunk(const at::Tensor& batch, const ChunkSizes& sizes, const F& f) {
   const int64_t total = batch.size(0);

@@ -1,5 +1,4 @@
-// Pretrained image network that replaces a policy's convolutions: a TorchScript program and its description, in a file
-// that scripts/export_backbone wrote.
+// Pretrained image network that replaces a policy's convolutions.
 #pragma once
 
 #include <memory>
@@ -16,24 +15,22 @@ struct NamedTensor;
 
 class ImageBackbone {
  public:
-  /// Reads a program. `options` are the type and device of its weights. If `frozen`, the weights get no gradients.
-  /// Throws Error, which names the file, if it does not exist or is not a file of scripts/export_backbone.
+  /// Reads a TorchScript program of scripts/export_backbone. options: type and device of its weights, which get no
+  /// gradients if `frozen`. Throws Error naming the file if it is not such a file.
   ImageBackbone(const std::string& path, const at::TensorOptions& options, bool frozen);
   ~ImageBackbone();
 
-  /// Number of channels of a feature map.
+  /// Channels of a feature map.
   int64_t channels() const;
-  /// Hash of the file's bytes: 16 hexadecimal digits.
+  /// Hash of the file: 16 hexadecimal digits.
   const std::string& hash() const;
-  /// Trained weights; their names are "image_backbone." followed by the name in the program. Empty if frozen.
+  /// Trained weights, empty if frozen. Their names are "image_backbone." and the name in the program.
   const std::vector<NamedTensor>& parameters() const;
-  /// Throws Error, which names file and camera, if the program supports only one image size and a camera of the rig has
-  /// another size.
+  /// Throws Error naming file and camera if the program supports one image size and a camera has another.
   void check_images(const Rig& rig) const;
 
-  /// Computes the feature maps of images. images: u8 [views, cameras, 3, height, width]; result: [cameras * views,
-  /// channels, rows, columns], with channels last in memory. Each position of a map corresponds to one patch of the
-  /// image. Images whose size is not a multiple of the patch size are padded with black at the right and the bottom.
+  /// Returns feature maps [cameras * views, channels, rows, columns], channels last in memory, with one position per
+  /// patch. images: u8 [views, cameras, 3, height, width]; black pixels at the right and the bottom complete patches.
   at::Tensor forward(const at::Tensor& images) const;
 
  private:

@@ -1,5 +1,5 @@
-// Device on which a network computes, and arrays in its memory. Includes no torch headers: torch_device.cpp implements
-// these functions with torch; host_device.cpp implements them for builds without torch, which compute on the host.
+// Device of the network, and arrays in its memory. Includes no torch headers; host_device.cpp is for builds without
+// torch.
 #pragma once
 
 #include <memory>
@@ -11,30 +11,28 @@
 
 namespace pictura {
 
-/// Returns the device on which this configuration learns. If there are several devices and the configuration gives no
-/// index, local_rank (the index of the process on this machine) selects the device. Loads torch's CUDA library for a
-/// CUDA device. Throws Error if the configuration cannot learn on this device, or if the simulator or the renderer uses
-/// other memory. The message contains the setting's key and the reason.
+/// Returns the device on which this configuration learns. Without a device index in the configuration, local_rank (the
+/// process's index on this machine) selects one. Throws Error naming the key if learning there is impossible, or if
+/// simulator or renderer use other memory.
 Device open_learning_device(const Config& config, int local_rank = 0);
 
-/// Returns torch's current stream of a device, or null on the host. The network's forward and backward passes are
-/// enqueued on this stream.
+/// Returns torch's current stream, which the network uses; null on the host.
 Stream current_stream(Device device);
 
-/// Allocates uninitialised memory on a device. The memory is freed with the pointer.
+/// Allocates uninitialised memory, which the pointer frees.
 std::shared_ptr<std::byte> allocate_bytes(size_t bytes, Device device);
 void set_to_zero(std::byte* memory, size_t bytes, Device device);
-/// Copies on the current stream. A copy to the host is complete on return. A copy from the host has read its source on
-/// return, so the source may be freed.
+/// Copies on the current stream. On return, a copy to the host is complete, and the source of a copy from the host may
+/// be freed.
 void copy_bytes(std::byte* to, Device to_device, const std::byte* from, Device from_device, size_t bytes);
 
-/// Array in the memory of a device.
+/// Array in a device's memory.
 template <typename T>
 class DeviceArray {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
-  /// Allocates `size` uninitialised elements.
+  /// Allocates uninitialised elements.
   DeviceArray(size_t size, Device device) : size_(size), memory_(allocate_bytes(size * sizeof(T), device)) {}
   Span<const T> span() const { return {data(), size_}; }
   Span<T> span() { return {data(), size_}; }
@@ -47,7 +45,7 @@ class DeviceArray {
   std::shared_ptr<std::byte> memory_;
 };
 
-/// Array in the memory of `device` with a copy of host values. The host values may be freed afterwards.
+/// Array with a copy of host values.
 template <typename T>
 class DeviceCopy : public DeviceArray<T> {
  public:
@@ -57,7 +55,7 @@ class DeviceCopy : public DeviceArray<T> {
   }
 };
 
-/// Returns a host copy of an array in the memory of `device`.
+/// Returns a host copy of an array on `device`.
 template <typename T>
 std::vector<std::remove_const_t<T>> host_copy(Span<T> array, Device device) {
   static_assert(std::is_trivially_copyable_v<T>);

@@ -1,4 +1,4 @@
-// Sizes used by the policy's layers and by the estimate of their memory.
+// Sizes of the policy's layers.
 #pragma once
 
 #include <string_view>
@@ -10,12 +10,10 @@
 
 namespace pictura {
 
-/// Number of ego features that a policy reads. Policies that read images do not read the last two features, which are
-/// auxiliary.
+/// Number of ego features that a policy reads. Image policies do not read the last two, which are auxiliary.
 constexpr int num_ego_features(bool sees_images) { return sees_images ? kEgoFeatures - 2 : kEgoFeatures; }
 
-/// Returns the additional features to compute for each row of an observation array (see row_features.h). `array` is the
-/// name of an entity set, or "waypoints".
+/// Returns the features (row_features.h) for rows of `array`, an entity set or "waypoints".
 inline RowFeatures row_features_of(const PolicySection& policy, std::string_view array) {
   const int points = array == "controls" ? 2 : 1;  // a stop line has two ends
   const bool is_segment = array == "lanes" || array == "boundaries" || array == "walls";
@@ -24,8 +22,7 @@ inline RowFeatures row_features_of(const PolicySection& policy, std::string_view
           .position_unit_m = kScalePosition_m};
 }
 
-/// Number of sines and cosines that encode a token's position in the image. The encoding does not depend on the image
-/// size.
+/// Number of sines and cosines that encode a token's position.
 constexpr int kPositionFeatures = 8;
 
 }  // namespace pictura

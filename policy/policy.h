@@ -1,7 +1,5 @@
-// The paper's two policies (appendix, table of the policy architecture). Both have the same trunk with actor and
-// critic. Before the trunk, the vector policy has encoders of four entity sets (five with walls). The image policy
-// instead has an image encoder whose output is as wide as those of the four encoders together. The code uses tensors
-// and functions, but no torch modules.
+// The paper's vector and image policies (appendix, table of the policy architecture). They share a trunk with actor and
+// critic. The image encoder's output is as wide as that of the vector policy's entity set encoders.
 #pragma once
 
 #include <functional>
@@ -18,27 +16,26 @@
 
 namespace pictura {
 
-/// Parameter with the name under which it is saved.
+/// Parameter with its name in files.
 struct NamedTensor {
   std::string name;
   at::Tensor value;
 };
 
-/// Returns the hash of the parameters' bytes in their order: 16 hexadecimal digits.
+/// Returns 16 hexadecimal digits.
 std::string hash_of_parameters(const std::vector<NamedTensor>& parameters);
 
 class ImageBackbone;
 
-/// Network that encodes the surroundings of each agent as one embedding.
+/// Encoder of an agent's surroundings as one embedding.
 class SceneEncoder {
  public:
   virtual ~SceneEncoder() = default;
   virtual at::Tensor forward(const Observation& observation) const = 0;
-  /// Width of the embedding.
   virtual int64_t width() const = 0;
-  /// Pretrained program that replaces the convolutions, or null.
+  /// Program that replaces the convolutions, or null.
   virtual const ImageBackbone* image_backbone() const { return nullptr; }
-  /// See Policy::drawn_patch_px.
+  /// See Policy::drawn_patch_px().
   virtual int drawn_patch_px() const { return 0; }
 };
 
@@ -58,14 +55,12 @@ class Policy {
 
   const std::vector<NamedTensor>& parameters() const { return parameters_; }
   int64_t num_parameters() const;
-  /// Hash of parameters(), see hash_of_parameters().
   std::string hash() const;
-  /// Hash of the file policy.backbone; empty for vector policies and if policy.backbone is "conv".
+  /// Hash of the program policy.backbone; empty without one.
   virtual std::string backbone_hash() const { return ""; }
-  /// Throws Error, which names camera and file, if the program policy.backbone does not support the images of the rig.
+  /// Throws Error naming camera and file if the program policy.backbone does not support an image size.
   virtual void check_images(const Rig& /*rig*/) const {}
-  /// Side in px of the image patches that the policy can read (ImageBlock); 0 if it reads only planar images. If the
-  /// renderer draws such patches, images need no conversion before the first convolution.
+  /// Side in px of image patches (ImageBlock) that the policy reads without conversion; 0: none.
   virtual int drawn_patch_px() const { return 0; }
 
  protected:
@@ -75,9 +70,9 @@ class Policy {
 /// The paper's actor-critic network.
 class PolicyNetwork final : public Policy {
  public:
-  /// Initializes parameters with random numbers that depend only on seed, index of the parameter and index of the
-  /// element. Parameters of a program (policy.backbone) are read from its file instead. With `reads_walls`, a vector
-  /// policy encodes walls too. The host supports bf16, but slowly; for tf32 it computes in fp32.
+  /// Draws parameters that depend only on seed, parameter index and element index. Parameters of a program
+  /// (policy.backbone) come from its file. reads_walls: a vector policy encodes walls too. The host supports bf16
+  /// slowly, and computes in fp32 instead of tf32.
   PolicyNetwork(const PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
                 bool reads_walls = false, Device device = {}, Precision precision = Precision::fp32);
 
@@ -112,29 +107,29 @@ class PolicyNetwork final : public Policy {
   friend class PerspectiveEncoder;
 };
 
-/// Creates the policy of a configuration, for the cameras of a rig. The host computes in fp32. Throws Error, which
-/// names the file, if the program policy.backbone cannot be used.
+/// Creates a configuration's policy for a rig. The host computes in fp32. Throws Error naming the file if the program
+/// policy.backbone cannot be used.
 std::unique_ptr<const Policy> make_policy(const Config& config, const Rig& rig, Device device);
 
-/// Multiplies the policy's logits by a factor: scales the parameters of the layer that computes the logits.
+/// Multiplies the policy's logits by a factor.
 void scale_logits(const Policy& policy, double factor);
 
-/// Outputs of a policy for a batch, without gradients: logits and log-probabilities [batch, actions], values [batch].
+/// Outputs for a batch, without gradients: logits and log-probabilities [batch, actions], values [batch].
 struct Decision {
   at::Tensor logits, log_probs, value;
 
-  /// Returns whether all logits and values are finite, as a bool tensor on their device.
+  /// Whether all logits and values are finite, as a bool tensor.
   at::Tensor are_finite() const;
-  /// Whether all logits and values are finite. Waits for the device.
+  /// Waits for the device.
   bool is_finite() const { return are_finite().item<bool>(); }
 };
-/// Runs the policy, chunk by chunk, for the agents with row numbers `rows`, i64 [batch]. act(rows) must return the
-/// policy's output for the rows of a chunk. Each output of act() may become invalid at the next call of act().
+/// Runs the policy chunk by chunk for `rows`, i64 [batch]. act(rows) returns the output for a chunk's rows, valid until
+/// its next call.
 Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
                 const std::function<Policy::Output(const at::Tensor& rows)>& act);
 
-/// Returns the largest value of each channel over the members of each set: [batch, members, width] -> [batch, width].
-/// Members from index counts[i] on are padding; counts: [batch]. An empty set gives zeros.
+/// Returns each channel's largest value in a set: [batch, members, width] -> [batch, width]; 0 for an empty set.
+/// Members from index counts[i] on are padding; counts: [batch].
 at::Tensor masked_max(const at::Tensor& members, const at::Tensor& counts);
 
 }  // namespace pictura

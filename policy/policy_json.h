@@ -1,5 +1,4 @@
-// Description of a policy in the headers of checkpoints and safetensors, in JSON. Only code that reads and writes these
-// formats should include this header.
+// JSON headers of checkpoints and safetensors.
 #pragma once
 
 #include <string>
@@ -10,11 +9,9 @@
 
 namespace pictura {
 
-/// Returns the observation schema: names and shapes of the policy's input and output arrays. A policy whose schema
-/// differs from the current schema cannot be used.
+/// Returns names and shapes of the policy's input and output arrays.
 nlohmann::ordered_json schema_to_json(const Config& config);
-/// Throws Error if the saved schema differs from the current schema of `config`; the message names the file and the
-/// first different entry.
+/// Throws Error naming the file and the first entry in which the saved schema differs from that of `config`.
 void check_schema(const nlohmann::ordered_json& saved, const Config& config, const std::string& path);
 
 nlohmann::ordered_json rig_to_json(const Rig& rig);

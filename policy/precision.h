@@ -1,5 +1,5 @@
-// Precision and reproducibility of the network's arithmetic on a CUDA device. Parameters, the optimizer, actor and
-// critic heads, log-probabilities and losses are fp32 at every precision.
+// Precision and reproducibility on CUDA devices. Parameters, optimizer, heads, log-probabilities and losses are always
+// fp32.
 #pragma once
 
 #include <ATen/autocast_mode.h>
@@ -8,18 +8,16 @@
 
 namespace pictura {
 
-/// Sets, for the whole process, whether torch computes products of fp32 numbers in IEEE arithmetic or in TF32.
+/// Selects IEEE or TF32 products of fp32 numbers for the whole process.
 void set_float32_products(Precision precision);
 
-/// Sets, for the whole process, whether torch computes the same bits in every run. If so, torch and cuDNN use
-/// deterministic algorithms, and cuBLAS uses a workspace that makes it reproducible. Torch and cuBLAS read the size of
-/// the workspace from the environment variable CUBLAS_WORKSPACE_CONFIG at their first product on a device, so call this
-/// function earlier. Throws Error if the variable already has a different value.
+/// Sets for the whole process whether torch, cuDNN and cuBLAS compute the same bits in every run. Call it before the
+/// first product on a device, because torch then reads CUBLAS_WORKSPACE_CONFIG. Throws Error if this environment
+/// variable has a different value.
 void set_reproducible(bool reproducible);
 
-/// Scope in which cuDNN times its algorithms for every new size and selects the fastest (autotuning). Has no effect if
-/// torch is set to be reproducible. Use it only for updates of the policy: in rollouts, the size changes with the
-/// number of active agents.
+/// Scope in which cuDNN times its algorithms for every new size, and selects the fastest. Has no effect if torch is
+/// reproducible. Use it only for updates, because sizes vary in rollouts.
 class Autotuner {
  public:
   Autotuner();
@@ -28,7 +26,7 @@ class Autotuner {
   Autotuner& operator=(const Autotuner&) = delete;
 };
 
-/// Scope in which layers compute in bf16 if `precision` is bf16; has no effect at other precisions.
+/// Scope in which layers compute in bf16, if `precision` is bf16.
 class LayerPrecision {
  public:
   LayerPrecision(Precision precision, at::DeviceType device) : is_bf16_(precision == Precision::bf16), device_(device) {
@@ -39,7 +37,7 @@ class LayerPrecision {
   }
   ~LayerPrecision() {
     if (!is_bf16_) return;
-    // The cache of cast weights is valid only within a scope, because the optimizer changes weights between scopes.
+    // The optimizer changes weights between scopes, so cached casts become invalid.
     if (at::autocast::decrement_nesting() == 0) at::autocast::clear_cache();
     at::autocast::set_autocast_enabled(device_, false);
   }

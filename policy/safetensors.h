@@ -1,5 +1,5 @@
-// Writer of the safetensors format (https://github.com/huggingface/safetensors), which other tools read. A file
-// contains the length of a JSON header (u64), the header, and raw data.
+// Writer of the safetensors format (https://github.com/huggingface/safetensors): length of a JSON header (u64), the
+// header, and raw data.
 #pragma once
 
 #include <bit>
@@ -14,7 +14,7 @@ namespace pictura {
 
 enum class SafeType : uint8_t { f32, bf16, i64 };
 
-/// Returns the name of a type in the header of a file.
+/// Returns a type's name in the header.
 std::string_view name_of(SafeType type);
 
 struct SafeTensor {
@@ -24,7 +24,7 @@ struct SafeTensor {
   std::string bytes;  // little endian, in row-major order
 };
 
-/// Returns the bytes of a file with these tensors. metadata: a JSON object whose values are strings.
+/// Returns a file's bytes. metadata: a JSON object of strings.
 std::string safetensors(const std::vector<SafeTensor>& tensors, const nlohmann::ordered_json& metadata);
 
 /// Returns the nearest bfloat16 of a finite number, ties to even.

@@ -1,4 +1,4 @@
-// Base class of PolicySession's implementations: its settings, and the interface of the code that computes the policy.
+// Base class of PolicySession's implementations.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,7 @@ struct SessionParts {
   SessionParts(const SessionParts&) = delete;
   SessionParts& operator=(const SessionParts&) = delete;
 
-  /// The following functions implement those with the same names in PolicySession.
+  /// The following functions implement those of PolicySession.
   virtual std::string policy_hash() const = 0;
   virtual std::unique_ptr<SessionParts> make_untrained(uint64_t seed) const = 0;
   virtual void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out,
@@ -29,21 +29,21 @@ struct SessionParts {
   const Device device;
   const Rig rig;
   const double camera_severity;
-  bool observes_vectors = false;  // adds vector observations, even if the policy reads images
+  bool observes_vectors = false;  // image policies get vector observations too
 
  protected:
-  /// Throws Error if the renderer, the scene or views are missing, or if their sizes do not fit the batch.
+  /// Throws Error if renderer, scene or views are missing, or do not fit the batch.
   void check_images(const PolicyInput& input, size_t batch, const Renderer* renderer) const;
-  /// Throws Error, which names the precision, if the policy's outputs are not finite.
+  /// Throws Error naming the precision if the policy's outputs are not finite.
   void check_outputs(bool are_finite) const;
 };
 
-/// Returns the rig of the options if they define one, else the rig of training. A policy can use other cameras, because
-/// no weight depends on sizes or poses of cameras. Throws as PolicySession does.
+/// Returns the options' rig, else that of training. Other cameras are possible, because no weight depends on them.
+/// Throws as PolicySession does.
 Rig chosen_rig(const PolicyFacts& saved, const SessionOptions& options);
 
-/// Open a session in which torch or policy/host_network.h computes the policy. open_host_session() throws Error if the
-/// options specify a device other than the host, or if policy.backbone is a program.
+/// Open a session with torch or with policy/host_network.h. open_host_session() throws Error if the options specify
+/// another device than the host, or if policy.backbone is a program.
 std::unique_ptr<SessionParts> open_torch_session(const std::string& path, const SessionOptions& options);
 std::unique_ptr<SessionParts> open_host_session(const std::string& path, const SessionOptions& options);
 

@@ -1,5 +1,4 @@
-// Policy in a file: its weights and all other data that are needed to run it, without the state of its training. The
-// file is a checkpoint or a safetensors file (policy/safetensors.h). Includes no torch headers.
+// Policy in a file: a checkpoint, or a safetensors file (policy/safetensors.h). Includes no torch headers.
 #pragma once
 
 #include <cstdint>
@@ -13,22 +12,22 @@
 
 namespace pictura {
 
-/// Parameter as it is stored in files, in row-major order.
+/// Parameter in row-major order.
 struct StoredTensor {
   std::string name;
   std::vector<int64_t> shape;
   std::vector<float> values;
 };
 
-/// Content of a policy file besides the weights.
+/// Content of a policy file besides weights.
 struct PolicyFacts {
   std::string path;  // source file, for messages
   Config config;
   Rig rig;
-  std::string backbone_hash;  // Policy::backbone_hash(); policy files do not contain the backbone program itself
-  int64_t update = 0;         // number of completed updates of the training run
+  std::string backbone_hash;  // Policy::backbone_hash()
+  int64_t update = 0;         // completed updates
   int64_t agent_steps = 0;
-  /// Learning-rate factors that are not 1, by name of the parameter; see Optimizer::rate_factors.
+  /// Factors other than 1, by parameter; see Optimizer::rate_factors.
   std::map<std::string, double> rate_factors;
 };
 
@@ -36,35 +35,30 @@ struct StoredPolicy : PolicyFacts {
   std::vector<StoredTensor> parameters;
 };
 
-/// Reads the policy of a checkpoint, or of a safetensors file that write_stored_policy() wrote. With `average`, it
-/// reads the average of weights, which some checkpoints contain. Throws Error, which names the file, if the file is
-/// neither, is truncated or damaged, or has no average although `average` is set. Also throws Error if its observation
-/// schema differs from the current schema; the message names the first different entry.
+/// Reads the policy of a checkpoint or of a file of write_stored_policy(). average: reads averaged weights, which some
+/// checkpoints contain. Throws Error naming the file if it is neither, is truncated or damaged, or lacks the average.
+/// Throws Error naming the first different entry if its observation schema is not the current one.
 StoredPolicy read_stored_policy(const std::string& path, bool average = false);
-/// Returns the bytes of a policy file.
 std::string read_policy_file(const std::string& path);
-/// Parses the bytes of a policy file. Otherwise as read_stored_policy().
+/// Parses a file's bytes; otherwise as read_stored_policy().
 StoredPolicy parse_stored_policy(const std::string& file, const std::string& path, bool average = false);
 
-/// Writes a safetensors file: first to a temporary file, which is then renamed to `path`. The metadata are texts:
-/// config (TOML), schema and rig (JSON), rate_factors (JSON, if there are any), backbone_hash, update, agent_steps,
-/// commit (of this program), and hash. The hash is FNV-1a of the whole file with zeros in place of the 16 digits of the
-/// hash. Throws Error, which names the path, if the file cannot be written.
+/// Writes a safetensors file through a temporary file. Its metadata are texts: config (TOML), schema and rig (JSON),
+/// rate_factors (JSON, if any), backbone_hash, update, agent_steps, commit, and hash. The hash is FNV-1a of the file
+/// with zeros instead of the hash's 16 digits. Throws Error naming the path if writing fails.
 void write_stored_policy(const std::string& path, const StoredPolicy& policy, WeightType type,
                          const std::string& commit);
 
-/// Throws Error, which names the file `path` and the tensor, if a number is not finite. Without this check, such a
-/// policy would still choose actions.
+/// Throws Error naming file and tensor if a number is not finite; such a policy would still choose actions.
 void check_finite(const std::string& path, const std::vector<StoredTensor>& saved);
 
-/// Returns the parameter with this name among `saved`, which were read from the file `path`. Throws Error, which names
-/// the file and the parameter, if the parameter is missing or has another shape.
+/// Returns the parameter with this name. Throws Error naming file and parameter if it is missing or has another shape.
 const StoredTensor& find_parameter(const std::string& path, const std::vector<StoredTensor>& saved,
                                    const std::string& name, const std::vector<int64_t>& shape);
-/// Throws Error, which names the file, if the number of parameters is not `expected`.
+/// Throws Error naming the file if the number of parameters is not `expected`.
 void check_parameter_count(const std::string& path, const std::vector<StoredTensor>& saved, size_t expected);
 
-/// Returns the hash of the parameters' bytes in their order: 16 hexadecimal digits.
+/// Returns 16 hexadecimal digits.
 std::string hash_of_parameters(const std::vector<StoredTensor>& parameters);
 
 }  // namespace pictura

@@ -1,18 +1,16 @@
-// Vectors of 16 floats on processors with AVX-512, selected at run time, so that programs also run on processors
-// without AVX-512.
+// Vectors of 16 floats on processors with AVX-512, selected at run time.
 #pragma once
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define PICTURA_HAS_WIDE_VECTORS 1
-/// Attribute of a function that may be called only if has_wide_vectors() is true. Functions that are inlined into it
-/// may use AVX-512 too.
+/// Attribute of a function that may only run if has_wide_vectors(). Functions inlined into it may use AVX-512 too.
 #define PICTURA_WIDE [[gnu::target("avx512f,avx512bw,avx512dq,avx512vl,fma")]]
 #else
 #define PICTURA_HAS_WIDE_VECTORS 0
 #define PICTURA_WIDE
 #endif
 
-/// Attribute of a function that is always inlined, and so is compiled for the processor of its caller.
+/// Attribute of a function that is compiled for the processor of its caller.
 #define PICTURA_INLINE [[gnu::always_inline]] inline
 
 namespace pictura::host {
@@ -27,7 +25,7 @@ inline bool has_wide_vectors() {
 #endif
 }
 
-/// Vector of kFloats floats. It needs no alignment: it may begin at any float in memory.
+/// Vector of kFloats floats, aligned like a float.
 template <int kFloats>
 struct VectorOf {
   typedef float Type __attribute__((vector_size(kFloats * sizeof(float)), aligned(alignof(float)), may_alias));

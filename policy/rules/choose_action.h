@@ -1,5 +1,5 @@
-// Chooses an action from the log-probabilities of one agent: the most likely action or a random draw. The random number
-// depends only on (seed, global world, agent, episode, step), so draws are equal on all devices.
+// Choice of an agent's action. Draws depend only on (seed, global world, agent, episode, step), and are equal on all
+// devices.
 #pragma once
 
 #include "pictura/common/math.h"
@@ -27,7 +27,7 @@ PICTURA_HD inline int32_t draw_action(const float* log_probs, int num_actions, f
   return num_actions - 1;
 }
 
-/// Key of the random draw of an action: agent and time.
+/// Key of an action's random draw.
 struct ActionKey {
   uint64_t seed;
   uint32_t global_world, agent, episode, step;  // agent: index in its world
@@ -43,13 +43,13 @@ PICTURA_HD inline int32_t draw_action(const float* log_probs, int num_actions, c
   return draw_action(log_probs, num_actions, stream.uniform());
 }
 
-/// Rule by which actions are chosen from their log-probabilities.
+/// Rule of choice.
 struct ActionChoice {
   bool argmax = false;  // true: the most likely action; false: a random draw
-  uint64_t seed = 0;    // seed of the draws
+  uint64_t seed = 0;
 };
 
-/// Chooses the action of the agent in a slot. Runs on hosts and GPUs.
+/// Chooses the action of the agent in a slot.
 struct ActionRule {
   SlotTable slots;
   Span<const int32_t> episode_index, episode_step;  // [worlds]
@@ -58,7 +58,7 @@ struct ActionRule {
   ActionRule(const SimulatorArrays& input, const ActionChoice& its_choice)
       : slots(input.slots), episode_index(input.episode_index), episode_step(input.episode_step), choice(its_choice) {}
 
-  /// Returns the action of the agent in `slot`. log_probs: [kNumActions].
+  /// log_probs: [kNumActions].
   PICTURA_HD int32_t operator()(int64_t slot, const float* log_probs) const {
     if (choice.argmax) return most_likely_action(log_probs, kNumActions);
     const auto world = static_cast<size_t>(slots.world_of_slot[slot]);
@@ -68,7 +68,7 @@ struct ActionRule {
   }
 };
 
-/// Writes the command of an action, for slots that the mask selects.
+/// Writes an action's command if the mask selects the slot.
 PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t> mask, int64_t slot,
                                      Command* commands_out) {
   if (!mask.empty() && !mask[slot]) return;
@@ -76,11 +76,11 @@ PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t>
   commands_out[slot].action = actions[slot];
 }
 
-/// Test whether the policy is evaluated for the agent in a slot.
+/// Test whether the policy is evaluated for a slot.
 struct DecidingSlots {
   const AgentStatus* status;
-  Span<const uint8_t> mask;  // [slots] 0: the slot is excluded; empty: no slot is excluded
-  const uint8_t* left;       // [slots] 1: the agent has just left the map and is included; null: none
+  Span<const uint8_t> mask;  // [slots] 0: excluded; empty: none is
+  const uint8_t* left;       // [slots] 1: just left the map, and is included; or null
 
   PICTURA_HD bool operator()(int64_t slot) const {
     const bool is_asked = takes_actions(status[slot]) || (left != nullptr && left[slot] != 0);

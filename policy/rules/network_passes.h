@@ -1,5 +1,4 @@
-// Operations of a network on CUDA devices besides matrix products. Each operation passes once over memory, while ATen
-// passes several times. policy/host_passes.h contains the operations of the host.
+// Operations of a network on CUDA devices besides matrix products, each with one pass over memory.
 #pragma once
 
 #include <algorithm>
@@ -12,34 +11,32 @@ namespace pictura {
 
 enum class ActivationType : uint8_t { f32, bf16 };
 
-/// Size and type of contiguous activations [rows, channels]. All arrays of a call have this type, except parameters and
-/// their gradients, which are f32. All arrays must begin at multiples of 16 bytes.
+/// Size and type of contiguous activations [rows, channels]. Parameters and their gradients are f32. All arrays must
+/// begin at multiples of 16 bytes.
 struct ActivationSize {
   ActivationType type = ActivationType::f32;
   int64_t rows = 0, channels = 0;
 };
 
-/// Sizes for the conversion of images to the input of the first convolution. Each patch of patch_px^2 pixels becomes
-/// one position; images are padded with black to whole patches. Channel (c * patch_px + y) * patch_px + x of a position
-/// is color c of pixel (x, y) of the patch; further channels are 0. Images are u8 [views, cameras, 3, height_px,
-/// width_px]; the result is [cameras, views, rows, columns, channels], with colors from 0 to 255.
+/// Sizes for converting images u8 [views, cameras, 3, height_px, width_px] to patches [cameras, views, rows, columns,
+/// channels]. Channel (c * patch_px + y) * patch_px + x is color c (0 to 255) of pixel (x, y) of the patch; further
+/// channels are 0. Black pixels complete the last patches.
 struct PatchSize {
   int64_t views = 0, cameras = 0, height_px = 0, width_px = 0, patch_px = 1;
   static constexpr bool supports(int64_t patch_px) { return patch_px >= 1 && patch_px <= 4; }
-  /// Number of channels of a position, rounded up to a multiple of 8, because matrix units read vectors of 8.
+  /// Channels of a patch, rounded up to a multiple of 8 for matrix units.
   PICTURA_HD static constexpr int64_t channels_of(int64_t patch_px) { return (3 * patch_px * patch_px + 7) / 8 * 8; }
   PICTURA_HD int64_t rows() const { return (height_px + patch_px - 1) / patch_px; }
   PICTURA_HD int64_t columns() const { return (width_px + patch_px - 1) / patch_px; }
 };
 
-/// Columns of a segment's row (docs/reference/observation.md) from which features are computed, besides x and y of the
-/// segment's middle.
+/// Columns of a segment's row (docs/reference/observation.md).
 struct SegmentColumn {
-  static constexpr int kCos = 4, kSin = 5;  // cosine and sine of the segment's direction
+  static constexpr int kCos = 4, kSin = 5;  // direction of the segment
 };
 
-/// Features to compute from a row (see policy/row_features.h). A row begins with `points` pairs (x, y), each of which
-/// has kOfPoint features. With of_segment, the row is a segment and has kOfSegment further features.
+/// Features of a row (policy/row_features.h). A row begins with `points` pairs (x, y), with kOfPoint features each;
+/// of_segment adds kOfSegment features.
 struct RowFeatures {
   int points = 0;
   bool of_segment = false;
@@ -48,8 +45,7 @@ struct RowFeatures {
   PICTURA_HD constexpr int count() const { return points * kOfPoint + (of_segment ? kOfSegment : 0); }
 };
 
-/// Size of contiguous f32 rows and of their features. With keeps_rows, the row itself precedes its features in the
-/// result.
+/// Size of contiguous f32 rows and their features. keeps_rows: each row precedes its features in the result.
 struct RowSize {
   int64_t rows = 0, columns = 0;
   RowFeatures features;
@@ -59,25 +55,21 @@ struct RowSize {
   static constexpr int64_t kMaxWidth = 256;
 };
 
-/// Constants in the denominators of features (see policy/row_features.h).
 constexpr float kNearPoint_m = 4.0f, kFarPoint_m = 20.0f, kPointDirection_m = 1.0f;
 
-/// Returns a feature of a point. The first four features use only x or y.
 PICTURA_HD inline float point_feature(Vec2 point_m, int feature) {
   const float its_m = feature % 2 == 0 ? point_m.x : point_m.y;
   if (feature >= 4) return its_m / (length(point_m) + kPointDirection_m);
   return its_m / (fabsf(its_m) + (feature < 2 ? kNearPoint_m : kFarPoint_m));
 }
 
-/// Returns the agent's position relative to the segment of a row, in metres: x along the segment from its middle, y to
-/// the left of its line.
+/// Returns the agent's position in m relative to a segment: x along it from its middle, y to its left.
 PICTURA_HD inline Vec2 beside_segment(const RowFeatures& features, const float* row) {
   const Vec2 from_middle_m = Vec2{} - Vec2{row[0], row[1]} * features.position_unit_m,
              direction{row[SegmentColumn::kCos], row[SegmentColumn::kSin]};
   return {dot(from_middle_m, direction), cross(direction, from_middle_m)};
 }
 
-/// Returns feature number `feature` of a row.
 PICTURA_HD inline float row_feature(const RowFeatures& features, const float* row, int feature) {
   const int of_points = features.points * RowFeatures::kOfPoint;
   if (feature >= of_points) return point_feature(beside_segment(features, row), feature - of_points);
@@ -85,12 +77,12 @@ PICTURA_HD inline float row_feature(const RowFeatures& features, const float* ro
   return point_feature(Vec2{xy[0], xy[1]} * features.position_unit_m, feature % RowFeatures::kOfPoint);
 }
 
-/// Sizes for the encoder of entity sets: each member passes through a linear layer, GELU, and a second linear layer;
-/// both layers have kChannels outputs. With has_norm, the first layer's outputs are normalized before the GELU.
+/// Sizes for the encoder of entity sets: linear layer, normalization (if has_norm), GELU, and second linear layer, with
+/// kChannels outputs each.
 struct SetSize {
-  RowSize members;  // max_members rows for each set, including padding; keeps_rows is true
+  RowSize members;  // max_members rows per set; keeps_rows is true
   int64_t max_members = 0;
-  int64_t counts_stride = 1;  // distance in elements between the counts of consecutive sets
+  int64_t counts_stride = 1;  // distance of sets' counts in elements
   bool has_norm = false;
   static constexpr int kChannels = 64, kMaxWidth = 32, kMaxMembers = 254, kNoMember = 255;
   PICTURA_HD int64_t sets() const { return members.rows / max_members; }
@@ -98,25 +90,25 @@ struct SetSize {
     return channels == kChannels && hidden_channels == kChannels && width <= kMaxWidth && max_members >= 1 &&
            max_members <= kMaxMembers;
   }
-  /// Number of partial sums of each parameter's gradient.
+  /// Number of partial sums of each gradient.
   static constexpr int64_t kSums = 264;
 };
 
-/// Parameters of the layers of SetSize, or arrays with their shapes: hidden_weight [kChannels, members.width()], weight
+/// Parameters of SetSize's layers, or arrays of their shapes: hidden_weight [kChannels, members.width()], weight
 /// [kChannels, kChannels], biases [kChannels].
 template <typename Number>
 struct SetParameters {
   Number *hidden_weight, *hidden_bias, *weight, *bias;
 };
 
-/// Size of attention scores [matrices, tokens, columns]. `columns` must be even.
+/// Size of attention scores [matrices, tokens, columns], with even columns.
 struct TokenSize {
   ActivationType type = ActivationType::f32;
   int64_t matrices = 0, tokens = 0, columns = 0;
 };
 
-/// Interface of the operations. Objects have no state. Work is enqueued on the stream; all arrays are in device memory.
-/// Sums over rows have a fixed order, so that results are reproducible.
+/// Interface of the operations, which enqueue work on device arrays. Objects have no state. Sums over rows have a fixed
+/// order, so results are reproducible.
 class NetworkPasses {
  public:
   NetworkPasses() = default;
@@ -124,36 +116,33 @@ class NetworkPasses {
   NetworkPasses(const NetworkPasses&) = delete;
   NetworkPasses& operator=(const NetworkPasses&) = delete;
 
-  /// Whether rows may have this number of channels: supports_gelu() for bias_gelu(), supports_norm() for norm() and
-  /// bias_norm_gelu().
+  /// Channels for bias_gelu(), and for norm() and bias_norm_gelu().
   static constexpr bool supports_gelu(int64_t channels) { return channels % 8 == 0 && channels <= 1024; }
   static constexpr bool supports_norm(int64_t channels) {
     return channels % 64 == 0 && channels <= 512 && channels != 320 && channels != 448;
   }
 
-  /// Computes out = GELU(x + bias), with the exact (error function) GELU. bias: [channels].
+  /// Computes out = GELU(x + bias) with the error function.
   virtual void bias_gelu(const ActivationSize& size, const void* x, const float* bias, void* out, Stream stream) = 0;
-  /// Computes the gradient of x, and the gradient of the bias as partial sums [kBiasSums, channels], which the caller
-  /// adds.
+  /// Computes the gradient of x, and partial sums [kBiasSums, channels] of the bias's gradient, which the caller adds.
   virtual void bias_gelu_backward(const ActivationSize& size, const void* x, const float* bias, const void* grad_out,
                                   void* grad_x_out, float* grad_bias_sums_out, Stream stream) = 0;
   static constexpr int64_t kBiasSums = 528;
 
-  /// Computes out = GELU(layer norm of (x + bias)). The norm is over channels, without parameters, with an epsilon of
-  /// 1e-5.
+  /// Computes out = GELU(layer norm of (x + bias)) over channels, without parameters, with an epsilon of 1e-5.
   virtual void bias_norm_gelu(const ActivationSize& size, const void* x, const float* bias, void* out,
                               Stream stream) = 0;
-  /// Computes the gradient of x, and the gradient of the bias as partial sums [num_norm_sums(rows, 1), channels].
+  /// Computes the gradient of x, and partial sums [num_norm_sums(rows, 1), channels] of the bias's gradient.
   virtual void bias_norm_gelu_backward(const ActivationSize& size, const void* x, const float* bias,
                                        const void* grad_out, void* grad_x_out, float* grad_bias_sums_out,
                                        Stream stream) = 0;
 
-  /// Computes out = layer norm of (x + position) over channels, with an epsilon of 1e-5. weight, bias: [channels].
-  /// position: [period, channels], where row r uses position r % period. Without positions, it is null and period is 1.
+  /// Computes out = layer norm of (x + position) over channels, with an epsilon of 1e-5. position: [period, channels],
+  /// where row r uses position r % period; or null with a period of 1.
   virtual void norm(const ActivationSize& size, const void* x, const void* position, int64_t period,
                     const float* weight, const float* bias, void* out, Stream stream) = 0;
-  /// Computes the gradient of x, and the gradients of position, weight and bias as partial sums [num_norm_sums(rows,
-  /// period), period, 3, channels].
+  /// Computes the gradient of x, and partial sums [num_norm_sums(rows, period), period, 3, channels] of the gradients
+  /// of position, weight and bias.
   virtual void norm_backward(const ActivationSize& size, const void* x, const void* position, int64_t period,
                              const float* weight, const void* grad_out, void* grad_x_out, float* sums_out,
                              Stream stream) = 0;
@@ -161,26 +150,24 @@ class NetworkPasses {
     return std::clamp<int64_t>((8448 + period - 1) / period, 1, std::max<int64_t>(1, rows / period));
   }
 
-  /// Computes features of rows. out: [size.rows, size.width()]; the width must be at most RowSize::kMaxWidth.
+  /// Computes features. out: [size.rows, size.width()], at most RowSize::kMaxWidth wide.
   virtual void row_features(const RowSize& size, const float* rows, ActivationType type, void* out, Stream stream) = 0;
 
   virtual void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) = 0;
 
-  /// Embeds the members of entity sets and computes the largest value of each channel over the members of a set. out:
-  /// bf16 [sets, kChannels], 0 for an empty set. which_out: [sets, kChannels], index of the first member with this
-  /// value, or kNoMember for an empty set; null if not needed. counts: number of members of each set, with stride
-  /// size.counts_stride. Matrix products are in bf16.
+  /// Embeds the members of entity sets in bf16, and finds each channel's largest value in a set. out: bf16 [sets,
+  /// kChannels], 0 for an empty set. which_out: [sets, kChannels], index of the first member with this value, or
+  /// kNoMember; may be null. counts: members of each set.
   virtual void largest_embedding(const SetSize& size, const float* members, const int32_t* counts,
                                  const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
                                  Stream stream) = 0;
-  /// Computes the gradients of the parameters as partial sums [kSums, ...] from grad_out, the gradient of `out` (bf16).
+  /// Computes the parameters' gradients as partial sums [kSums, ...] from the gradient of `out` (bf16).
   virtual void largest_embedding_backward(const SetSize& size, const float* members,
                                           const SetParameters<const float>& parameters, const uint8_t* which,
                                           const void* grad_out, const SetParameters<float>& sums_out,
                                           Stream stream) = 0;
 
-  /// Computes out = softmax of the scores over tokens. The backward pass computes the gradient of the scores from `out`
-  /// and its gradient.
+  /// Computes out = softmax over tokens.
   virtual void token_softmax(const TokenSize& size, const void* scores, void* out, Stream stream) = 0;
   virtual void token_softmax_backward(const TokenSize& size, const void* out, const void* grad_out,
                                       void* grad_scores_out, Stream stream) = 0;

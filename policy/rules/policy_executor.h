@@ -1,5 +1,4 @@
-// Computations of a policy besides its network: selecting agents, choosing their actions, and writing commands. The
-// executors of the host and of CUDA devices give the same bits.
+// Executor of a policy's computations besides its network.
 #pragma once
 
 #include "pictura/common/array.h"
@@ -7,8 +6,8 @@
 
 namespace pictura {
 
-/// Interface of executors. Only one thread may use an executor at a time. All arrays are in the memory of device(). On
-/// a CUDA device, work is enqueued on the stream, and only functions that return a number wait for the stream.
+/// Interface of executors, which compute the same bits on hosts and CUDA devices. Only one thread may use one at a
+/// time. All arrays are on device(). Functions enqueue work on the stream; those that return a number wait.
 class PolicyExecutor {
  public:
   PolicyExecutor() = default;
@@ -17,19 +16,17 @@ class PolicyExecutor {
   PolicyExecutor& operator=(const PolicyExecutor&) = delete;
 
   virtual Device device() const = 0;
-  /// Memory available for computations: on a device, the free memory; on the host, all memory, because file caches can
-  /// be freed.
+  /// Free memory of a device, or all memory of the host, where file caches can be freed.
   virtual int64_t memory_bytes() const = 0;
 
-  /// Writes to slots_out, in ascending order, the slots for which asked(slot) is true. Returns their number. slots_out
-  /// must have room for all slots of the simulator.
+  /// Writes the slots for which asked(slot) is true, ascending, and returns their number. slots_out has room for all
+  /// slots.
   virtual int64_t select_deciding(const DecidingSlots& asked, Span<int64_t> slots_out, Stream stream = {}) = 0;
-  /// Chooses the actions of `slots`. log_probs: [slots.size(), kNumActions]; actions_out: [all slots of the simulator],
-  /// in which actions of other slots remain unchanged.
+  /// Chooses the actions of `slots`. log_probs: [slots.size(), kNumActions]; actions_out: [all slots]; others stay
+  /// unchanged.
   virtual void choose_actions(const SimulatorArrays& input, Span<const int64_t> slots, Span<const float> log_probs,
                               const ActionChoice& choice, Span<int32_t> actions_out, Stream stream = {}) = 0;
-  /// Writes commands with these actions for slots whose element of the mask is not 0 (empty mask: all slots). All
-  /// arrays are [slots].
+  /// Writes commands for slots with a nonzero mask (empty: all slots). All arrays are [slots].
   virtual void write_commands(Span<const int32_t> actions, Span<const uint8_t> mask, Span<Command> commands_out,
                               Stream stream = {}) = 0;
 };
