@@ -86,7 +86,13 @@ class Ranks(CommandCase):
         self.assertGreater(moved, 1e-4)
 
     def test_two_train_as_one_does(self):
-        one = ["--set", "train.updates=1", *self.GRADIENTS, "--set", "train.adv_filter_threshold=0.2"]
+        self.assert_two_train_as_one()
+
+    def test_two_that_hold_actions_train_as_one_does(self):
+        self.assert_two_train_as_one("--set", "policy.decision_steps=2")
+
+    def assert_two_train_as_one(self, *settings):
+        one = ["--set", "train.updates=1", *self.GRADIENTS, "--set", "train.adv_filter_threshold=0.2", *settings]
         alone = self.json_of(*self.SETTINGS, *one, "--out", self.folder / "alone")
         both = self.train(2, *self.SETTINGS, *one, "--out", self.folder / "both")
         self.assertEqual((alone["ranks"], both["ranks"]), (1, 2))

@@ -105,6 +105,19 @@ TEST_F(TeacherTest, RunsGoOnExactly) {
   EXPECT_NE(train(small_run(folder_ / "alone", "cpu", {"train.updates=2"})).policy_hash, whole);
 }
 
+TEST_F(TeacherTest, RunsThatHoldActionsGoOnExactly) {
+  const std::string teacher = vector_policy("teacher");
+  const std::vector<std::string> held{"train.teacher=" + teacher, "train.teacher_agent_steps=300",
+                                      "policy.decision_steps=3"};
+  const auto [whole, again, resumed] = test::policies_of_equal_runs(folder_.path(), "cpu", held);
+  EXPECT_EQ(again, whole);
+  EXPECT_EQ(resumed, whole);
+  std::vector<std::string> alone(held);
+  alone.insert(alone.end(), {"train.updates=2", "train.teacher_coef=0"});
+  EXPECT_NE(train(small_run(folder_ / "alone", "cpu", alone)).policy_hash, whole);
+  EXPECT_THAT(divergences(folder_ / "whole"), ::testing::Each(::testing::Gt(0)));
+}
+
 TEST_F(TeacherTest, OthersAreRefusedByName) {
   const auto message = [&](const std::string& teacher, std::vector<std::string> settings = {}) {
     settings.push_back("train.teacher=" + teacher);
