@@ -1,5 +1,5 @@
-// Kernels that the learner's host side launches, one thread per element. All launches are asynchronous on a stream;
-// callers check cudaGetLastError().
+// Kernels that the learner's host side launches, one thread per element, asynchronously on a stream. Callers check
+// cudaGetLastError().
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -20,9 +20,8 @@ void launch_count_advantages(Span<const float> advantages, Span<const uint8_t> v
                              cudaStream_t stream);
 void launch_permute(const Permutation& permutation, Span<const int64_t> items, int64_t* items_out, cudaStream_t stream);
 
-/// Rule that selects the transitions that the advantage filter keeps. Both select() functions write, in ascending
-/// order, the indices in [0, count) that a rule selects, and the number of these indices. If `scratch` is null, they
-/// only return the required scratch bytes.
+/// Rule that selects the transitions that the advantage filter keeps. select() writes the selected indices in [0,
+/// count), in ascending order, and their number. If `scratch` is null, it only returns the required scratch bytes.
 struct KeptTransitions {
   Span<const float> advantages;
   Span<const uint8_t> valid;

@@ -1,5 +1,4 @@
-// Kernels of network_passes.h, which documents their results. All launches are asynchronous on a stream; callers check
-// cudaGetLastError().
+// Kernels of network_passes.h, launched asynchronously on a stream. Callers check cudaGetLastError().
 #pragma once
 
 #include <cuda_runtime_api.h>

@@ -1,5 +1,5 @@
-// State that the threads of a block share while they draw an image, and warp collectives that balance uneven work.
-// Warps run independently and synchronize only between phases.
+// Shared state of a block's threads, and warp collectives that balance uneven work. Warps synchronize only between
+// phases.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/kernel_arguments.h"
@@ -9,14 +9,14 @@ namespace pictura::cuda {
 constexpr int kWarpSize = 32, kMaxWarps = 8;
 constexpr unsigned kAllLanes = 0xFFFFFFFFu;
 
-/// A view and its world's index ranges, for culling and face set-up.
+/// A view and its world's index ranges.
 struct ViewState {
   View view;
   const DeviceGeometry* geometry;
   int32_t world_begin, world_end, light_begin, light_end;
 };
 
-/// A rectangle of an image, at most as wide as a tile. Its pixels are indexed row by row.
+/// A rectangle of an image, at most as wide as a tile, with row-major pixel indices.
 struct Part {
   int x_begin, x_end, y_begin, y_end;
   __device__ int num_columns() const { return x_end - x_begin; }
@@ -31,39 +31,37 @@ struct Part {
   }
 };
 
-/// Drawing order of a tile whose fragments do not fit into memory together. The tile is divided into vertical bands,
-/// drawn from left to right; each band is drawn in parts from top to bottom.
+/// Drawing order of a tile that does not fit into memory as a whole: vertical bands from left to right, each in parts
+/// from top to bottom.
 struct PartPlan {
   int band_begin, band_px;  // first column and width of the current band
   int wide_px, rows;        // maximum size of a part
-  Part part;                // next part
+  Part part;
 };
 
-/// Storage of a WarpQueue.
 struct WarpQueueStorage {
   uint32_t a[2 * kWarpSize], b[2 * kWarpSize];
 };
 
-/// Shared memory of one warp.
 struct WarpState {
   WarpQueueStorage queue;
   uint8_t owners[kWarpSize];
 };
 
-/// Shared state of a block. It is always in shared memory, even if the rest of the block's memory is global.
+/// State of a block, always in shared memory.
 struct BlockState {
-  PreparedImage current;   // image that is being drawn
-  PreparedImage upcoming;  // next image
-  Scratch scratch;         // scratch memory of this block
-  ScreenFace* faces;       // faces of the current image
-  PolygonEdge* edges;      // pool of the edges of all images
+  PreparedImage current;  // image being drawn
+  PreparedImage upcoming;
+  Scratch scratch;
+  ScreenFace* faces;   // faces of the current image
+  PolygonEdge* edges;  // edges of all images
   // Used during culling and face set-up:
   ViewState view;
   FaceSetupContext context;
   SetupCounts listed;
   int32_t num_entries, num_faces, num_clipped, overflow, usable;
   // Used during drawing:
-  ImageEffect effect;  // effect on the current image
+  ImageEffect effect;
   int32_t num_rows, num_candidates, num_fragments, num_added, divides, num_composited, next_fragments, image;
   Part part, upcoming_part;
   PartPlan plan;
@@ -76,7 +74,7 @@ __device__ inline int lane_index() { return static_cast<int>(threadIdx.x) % kWar
 __device__ inline int warp_index() { return static_cast<int>(threadIdx.x) / kWarpSize; }
 __device__ inline unsigned lanes_below() { return (1u << lane_index()) - 1; }
 
-// Synchronizes the block. Without __syncwarp(), a diverged warp would arrive at the barrier twice.
+// Without __syncwarp(), a diverged warp would arrive at the barrier twice.
 __device__ inline void sync_block() {
   __syncwarp();
   __syncthreads();
@@ -89,12 +87,12 @@ __device__ inline int warp_next(int32_t* counter) {
   return __shfl_sync(kAllLanes, next, 0);
 }
 
-// Records a fault. Only the first fault is kept, until the host has thrown it.
+// Records a fault, unless an earlier fault is pending.
 __device__ inline void record_fault(const DrawTask& task, int32_t index, FaultKind kind) {
   atomicCAS(task.fault, kNoFault, word_of({kind, index}));
 }
 
-// Sets the state of a view. Returns false and records a fault if the view refers to something that does not exist.
+// Returns false and records a fault if the view is invalid.
 __device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t view_index) {
   auto fault = [&](FaultKind kind) {
     record_fault(task, view_index, kind);
@@ -123,7 +121,6 @@ __device__ inline bool set_view(ViewState* state, const DrawTask& task, int32_t 
   return true;
 }
 
-// Inclusive prefix sum over the lanes of a warp.
 __device__ inline int warp_inclusive_sum(int value) {
   for (int step = 1; step < kWarpSize; step *= 2) {
     const int other = __shfl_up_sync(kAllLanes, value, step);
@@ -132,14 +129,14 @@ __device__ inline int warp_inclusive_sum(int value) {
   return value;
 }
 
-// Allocates a whole warp's indices from a counter, with one atomic addition, and returns the first index to all lanes.
-// end: inclusive prefix sum of the lanes' counts.
+// Allocates a warp's indices with one atomic addition, and returns the first index. end: inclusive prefix sum of the
+// lanes' counts.
 __device__ inline int32_t warp_allocate(int32_t* counter, int end) {
   int32_t first = 0;
   if (lane_index() == kWarpSize - 1) first = atomicAdd(counter, end);
   return __shfl_sync(kAllLanes, first, kWarpSize - 1);
 }
-// Allocates and returns one index for each lane where `wanted` is true.
+// Allocates one index for each lane where `wanted` is true.
 __device__ inline int32_t warp_allocate_one(int32_t* counter, bool wanted) {
   const unsigned wanting = __ballot_sync(kAllLanes, wanted);
   int32_t first = 0;
@@ -147,8 +144,8 @@ __device__ inline int32_t warp_allocate_one(int32_t* counter, bool wanted) {
   return __shfl_sync(kAllLanes, first, 0) + __popc(wanting & lanes_below());
 }
 
-// Returns the rank, among lanes with items, of the lane that owns item `first + lane_index()`. The items of all lanes
-// of a warp are numbered consecutively; the items of the calling lane start at `begin`.
+// Returns the rank, among lanes with items, of the owner of item `first + lane_index()`. Items are numbered
+// consecutively over all lanes; the calling lane's items start at `begin`.
 __device__ inline int owner_rank(int first, int begin, bool has_some) {
   const bool starts_here = has_some && begin >= first && begin < first + kWarpSize;
   const unsigned starts = __reduce_or_sync(kAllLanes, starts_here ? 1u << (begin - first) : 0u);
@@ -156,14 +153,13 @@ __device__ inline int owner_rank(int first, int begin, bool has_some) {
   return before + __popc(starts & (lanes_below() << 1 | 1u)) - 1;
 }
 
-// Balances load among the lanes. Each lane has `count` items; `end` is the inclusive prefix sum of the counts. All
-// lanes call visit(item, owner, k) together, for 32 items at a time. item: index among the warp's items. owner: lane
-// that owns the item; -1 past the last item. k: index among the owner's items.
+// Balances load: each lane has `count` items, and all lanes together call visit(item, owner, k) for 32 items at a time.
+// end: inclusive prefix sum of the counts. item: index among the warp's items. owner: lane that owns the item; -1 past
+// the last item. k: index among the owner's items.
 template <typename Visit>
 __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& visit) {
   const int lane = lane_index(), begin = end - count;
   const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
-  // Writes the lanes that have items, without gaps.
   const unsigned owning = __ballot_sync(kAllLanes, count > 0);
   if (count > 0) warp->owners[__popc(owning & lanes_below())] = static_cast<uint8_t>(lane);
   __syncwarp();
@@ -177,17 +173,16 @@ __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& 
   }
 }
 
-// Returns the number of passes over a list. Neighbouring entries tend to be equally expensive, so the lanes of a warp
-// take entries that are far apart: in a pass, a lane takes entry lane * passes + pass. Every warp has equally many
-// passes.
+// Returns the number of each warp's passes over a list. A lane takes entry lane * passes + pass, because neighbouring
+// entries tend to be equally expensive.
 template <int kThreads>
 __device__ inline int passes_of(int count) {
   const unsigned rounds = static_cast<unsigned>(count + kThreads - 1) / kThreads;
   return static_cast<int>(rounds) * (kThreads / kWarpSize);
 }
 
-// Queue that compacts work within a warp. Lanes push pairs. If is_ready(), take() returns one pair to every lane. At
-// the end, take() may return fewer than 32 pairs; is_valid is true in lanes with a pair.
+// Queue that compacts a warp's work. If is_ready(), take() returns one pair to every lane. At the end, some lanes may
+// get no pair.
 class WarpQueue {
  public:
   __device__ explicit WarpQueue(WarpQueueStorage* storage) : storage_(storage) {}
@@ -224,8 +219,7 @@ class WarpQueue {
   int count_ = 0;
 };
 
-// Sums over the threads of a block, through an array with one element per thread. Collective over all threads of the
-// block.
+// Sums over the block's threads. of_thread: memory of one element per thread. Collective over the block.
 __device__ inline int64_t block_sum(int64_t* of_thread, int64_t value) {
   sync_block();
   of_thread[threadIdx.x] = value;

@@ -1,7 +1,6 @@
-// Clipping of faces that cross the frustum, and set-up of lights, which have many corners. A lane clips a face of four
-// corners, and all lanes make the edges. A whole warp handles a light, or a face with too many corners for a lane, with
-// one lane per corner. Results equal those of clip_face and make_screen_face bit for bit, because sums have the same
-// order.
+// Clipping of faces that cross the frustum, and set-up of lights. A lane clips a face of four corners. A warp handles
+// lights, and faces with too many corners for a lane, with one lane per corner. Results are bitwise identical to
+// clip_face and make_screen_face.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/draw_memory.cuh"
@@ -13,14 +12,13 @@ namespace pictura::cuda {
 
 static_assert(kMaxPolygonCorners <= kWarpSize);
 
-/// Maximum number of corners of a lane's face. A face cut by all five planes may have nine.
+/// Maximum corners of a lane's face. A face cut by all five planes may have nine.
 constexpr int kLaneCorners = 8;
 
-/// Shared memory of a warp that clips.
 struct ClipShared {
   Quad quad;  // quad of one lane, read by all lanes
-  // Corners: each lane uses a column, or the whole warp uses the first row. There are two additional rows, because a
-  // cut point and a kept corner may be written past the last row before the count is checked.
+  // Corners: one column per lane, or the first row for the warp. Two more rows hold corners that are written before the
+  // count is checked.
   static constexpr int kRows = kLaneCorners + 2;
   float x[kRows][kWarpSize], y[kRows][kWarpSize], z[kRows][kWarpSize];
   uint16_t edges[kLaneCorners * kWarpSize];  // see LaneEdge
@@ -29,7 +27,7 @@ struct ClipShared {
 /// An edge of a lane's face, packed into 16 bits.
 struct LaneEdge {
   int lane, from, to;  // lane of the face, and rows of the edge's corners
-  bool is_clockwise;   // orientation of the face
+  bool is_clockwise;
   __device__ uint16_t packed() const {
     return static_cast<uint16_t>(lane | from << 5 | to << 9 | (is_clockwise ? 1 << 13 : 0));
   }
@@ -40,7 +38,6 @@ struct LaneEdge {
 };
 static_assert(kWarpSize <= 32 && kLaneCorners <= 16);
 
-/// Corners of one lane's face.
 class LaneCorners {
  public:
   __device__ explicit LaneCorners(ClipShared* storage) : storage_(storage) {}
@@ -57,8 +54,7 @@ class LaneCorners {
   ClipShared* storage_;
 };
 
-// Stores a value in words of 16 bytes: with words of 4 bytes, each store of a warp would touch parts of many memory
-// segments.
+// Stores words of 16 bytes, so that a warp's stores touch fewer memory segments.
 template <typename Value>
 __device__ void store_words(Value* to, const Value& value) {
   static_assert(sizeof(Value) % sizeof(uint4) == 0 && alignof(Value) >= sizeof(uint4));
@@ -68,7 +64,6 @@ __device__ void store_words(Value* to, const Value& value) {
   for (int i = 0; i < kWords; ++i) reinterpret_cast<uint4*>(to)[i] = words[i];
 }
 
-// Copies a value, one lane per word of 16 bytes.
 template <typename Value>
 __device__ void copy_words(Value* to, const Value& from) {
   constexpr int kWords = sizeof(Value) / sizeof(uint4);
@@ -78,7 +73,7 @@ __device__ void copy_words(Value* to, const Value& from) {
   }
 }
 
-// Copies a value from global to shared memory asynchronously; valid after all lanes have called wait_for_copies().
+// The copy is valid after all lanes have called wait_for_copies().
 template <typename Value>
 __device__ void copy_words_async(Value* to, const Value& from) {
   static_assert(sizeof(Value) % sizeof(uint64_t) == 0 && alignof(Value) >= sizeof(uint64_t));
@@ -88,9 +83,9 @@ __device__ void copy_words_async(Value* to, const Value& from) {
   }
 }
 
-/// A face whose corners are distributed over the lanes, one each; the other members are the same in all lanes.
+/// A face with one corner per lane; the other members are equal in all lanes.
 struct WarpFace {
-  Vec3 corner;  // the lane's corner; valid in lanes below count
+  Vec3 corner;  // valid in lanes below count
   int count = 0;
   FacePlane plane;
   Rgb color;
@@ -102,15 +97,14 @@ __device__ inline Vec3 corner_of(Vec3 corner, int lane) {
           __shfl_sync(kAllLanes, corner.z, lane)};
 }
 
-// Sequential sum over the first kMaxPolygonCorners lanes, in lane order.
+// Sums the first kMaxPolygonCorners lanes in lane order.
 __device__ inline float sum_in_order(float value) {
   float sum = 0.0f;
   for (int lane = 0; lane < kMaxPolygonCorners; ++lane) sum += __shfl_sync(kAllLanes, value, lane);
   return sum;
 }
 
-// Returns an integer that sorts like the float with these bits. It is used for the minimum and maximum of the lanes'
-// values.
+// Returns an integer that sorts like the float with these bits.
 __device__ inline int32_t sortable_bits(int32_t bits) { return bits ^ (bits >> 31 & 0x7FFFFFFF); }
 __device__ inline float warp_min(float value) {
   return __int_as_float(sortable_bits(__reduce_min_sync(kAllLanes, sortable_bits(__float_as_int(value)))));
@@ -119,7 +113,7 @@ __device__ inline float warp_max(float value) {
   return __int_as_float(sortable_bits(__reduce_max_sync(kAllLanes, sortable_bits(__float_as_int(value)))));
 }
 
-// Broadcasts the quad of lane `owner` to all lanes, as a widened face.
+// Broadcasts the quad of lane `owner`, as a widened face.
 __device__ inline WarpFace broadcast_quad(const PinholeCamera& camera, ClipShared* storage, int owner,
                                           const Quad& quad) {
   __syncwarp();
@@ -133,7 +127,7 @@ __device__ inline WarpFace broadcast_quad(const PinholeCamera& camera, ClipShare
   return face;
 }
 
-// Makes the disk of a lit light head. The disk has no corners if it has faded to black.
+// A black light has no corners.
 __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t index) {
   const LightHead head = context.heads[index];
   const PinholeCamera& camera = context.setting.camera;
@@ -143,13 +137,11 @@ __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t i
           light_ref(index)};
 }
 
-// Clips a lane's face of `count` corners as clip_face does, but in place. This is possible because this function reads
-// one corner ahead, and writes at most one corner more than it has clipped. Returns the number of corners, or
-// kTooManyCorners if they do not fit or the face is not exactly convex.
+// Clips a lane's face in place, with the result of clip_face. Returns the number of corners, or kTooManyCorners if they
+// do not fit or the face is not exactly convex.
 constexpr int kTooManyCorners = -1;
 __device__ inline int clip(const Frustum& f, unsigned crossed, int count, LaneCorners corners) {
   if (crossed == kOutside) return 0;
-  // Each lane iterates over its own planes.
   PICTURA_NO_UNROLL
   for (; crossed != 0 && count > 0; crossed &= crossed - 1) {
     const ClipPlane plane(f, __ffs(static_cast<int>(crossed)) - 1);
@@ -175,8 +167,8 @@ __device__ inline int clip(const Frustum& f, unsigned crossed, int count, LaneCo
   return count;
 }
 
-// Projects a lane's clipped face as make_screen_face does, but in place. Sets its bounds and winding, and returns a bit
-// mask of the corners at which an edge begins; 0 if the face covers nothing.
+// Projects a lane's clipped face in place, with the result of make_screen_face. Returns a bit mask of the corners at
+// which an edge begins; 0 if the face covers nothing.
 __device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCorners corners, int count,
                                             ScreenBounds* bounds, bool* is_clockwise) {
   PICTURA_NO_UNROLL
@@ -203,7 +195,7 @@ __device__ inline unsigned project_in_place(const PinholeCamera& camera, LaneCor
   return fabsf(twice_area) < kMinTwiceArea_px2 ? 0 : edges;
 }
 
-// Version of clip_face for a face whose corners are distributed over the lanes.
+// Version of clip_face for a face with one corner per lane.
 __device__ inline void clip(const Frustum& f, ClipShared* storage, WarpFace* face_inout) {
   const int lane = lane_index();
   Vec3 corner = face_inout->corner;
@@ -222,7 +214,7 @@ __device__ inline void clip(const Frustum& f, ClipShared* storage, WarpFace* fac
     const bool is_cut = lane < count && (previous_inside >= 0.0f) != (inside >= 0.0f);
     const unsigned cuts = __ballot_sync(kAllLanes, is_cut), staying = __ballot_sync(kAllLanes, stays);
     const int index = __popc(cuts & lanes_below()) + __popc(staying & lanes_below());
-    // Only a face that is not exactly convex can exceed the maximum; the excess corners are dropped.
+    // Only a face that is not exactly convex exceeds the maximum; excess corners are dropped.
     const bool fits = index + 2 <= kMaxPolygonCorners;
     auto keep = [&](int at, Vec3 p) {
       storage->x[0][at] = p.x;
@@ -242,8 +234,7 @@ __device__ inline void clip(const Frustum& f, ClipShared* storage, WarpFace* fac
   face_inout->count = count;
 }
 
-// Version of make_screen_face for a clipped face whose corners are distributed over the lanes. Its edges are stored
-// from edge_begin on.
+// Version of make_screen_face for a face with one corner per lane. Stores the edges from edge_begin on.
 __device__ inline bool make_screen_face(const FaceSetupContext& context, const WarpFace& face, int32_t edge_begin,
                                         ScreenFace* face_out) {
   const PinholeCamera& camera = context.setting.camera;

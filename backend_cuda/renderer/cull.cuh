@@ -1,5 +1,5 @@
-// Culling: a warp tests the rows of the map's grid, one lane per row, then the bounding spheres of the pieces in these
-// rows, one lane per piece. Objects that may be visible are stored as entries, in batches of warp size.
+// Culling: a warp tests the map's grid rows, one lane per row, then their pieces' bounding spheres, one lane per piece.
+// Objects that may be visible become entries, in batches of warp size.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/draw_memory.cuh"
@@ -9,7 +9,7 @@ namespace pictura::cuda {
 
 constexpr uint32_t kNoEntry = ~0u;
 
-/// A side of the frustum's outline on the ground plane. It leads from its end with lower y to its end with higher y.
+/// A side of the frustum's outline on the ground plane; a.y <= b.y.
 struct alignas(16) OutlineSide {
   Vec2 a, b;
   float dx_dy;  // 0 for sides of constant y
@@ -20,24 +20,24 @@ constexpr int kOutlineSides = 8;
 /// Shared memory of a warp that culls.
 struct CullShared {
   OutlineSide sides[kOutlineSides];
-  // Arrays of strips and of walls, in the order of pieces_of.
+  // [0]: strips; [1]: walls.
   const Ball* balls[2];
   const int32_t* items[2];
   int32_t offsets[kWarpSize];  // offsets of non-empty rows, see cull_pieces
 };
 static_assert(FaceBatch::kEntries == kWarpSize);
 
-/// Entries of an image. All lanes of a warp call the functions together; several warps may share a list.
+/// Entries of an image. All lanes of a warp call the functions together.
 class EntryList {
  public:
-  /// count: in shared memory; counts all pushed entries, including those beyond max_entries, which are dropped.
+  /// count: number of pushed entries, in shared memory. It includes entries beyond max_entries, which are dropped.
   __device__ EntryList(uint32_t* entries, int32_t max_entries, int32_t* count)
       : entries_(entries), max_entries_(max_entries), count_(count) {}
   __device__ void push(bool wanted, uint32_t entry) {
     const int32_t index = warp_allocate_one(count_, wanted);
     if (wanted) set(index, entry);
   }
-  /// Pushes an entry for each set bit of `faces`, a mask of an agent's faces.
+  /// faces: bit mask of an agent's faces.
   __device__ void push_faces(unsigned faces, uint32_t object_id) {
     const int count = __popc(faces), end = warp_inclusive_sum(count);
     int32_t index = warp_allocate(count_, end) + end - count;
@@ -61,25 +61,23 @@ class EntryList {
   int32_t* count_;
 };
 
-// Returns the strips (0) or the walls (1) of a map.
 __device__ inline const PieceGrid& pieces_of(const DeviceGeometry& geometry, int of_walls) {
   return of_walls != 0 ? geometry.walls : geometry.strips;
 }
 
-// Returns the row or column at a distance from the grid's origin. Rounding does not matter, because bounding spheres
-// exceed their pieces by more than rounding errors.
+// Returns the row or column at a distance from the grid's origin. Rounding is harmless, because bounding spheres have a
+// larger margin.
 __device__ inline int cell_at(float distance_m, float cells_per_m, int count) {
   return clamp(static_cast<int>(floorf(distance_m * cells_per_m)), 0, count - 1);
 }
 
-// Rows of the grids of strips and of walls that the outline may touch.
+// Grid rows that the outline may touch. [0]: strips; [1]: walls.
 struct GridRows {
   int begin[2], count[2];
 };
 
-// Sets the outline: the four edges from the eye to the far corners, and the four edges between neighbouring corners. On
-// the ground plane, these edges include all sides of the outline's convex hull. Collective over all lanes of the warp;
-// strips and walls each have one lane per side.
+// Sets the outline's sides: four edges from the eye to the far corners, and four between far corners. They include all
+// sides of the convex hull. Collective over the warp.
 __device__ inline GridRows set_outline(CullShared* storage, const ImageSetting& setting,
                                        const DeviceGeometry& geometry) {
   const int side = lane_index() % kOutlineSides, of_walls = lane_index() / kOutlineSides & 1;
@@ -144,7 +142,6 @@ __device__ inline PieceRange pieces_of_row(const PieceGrid& pieces, const Outlin
   return {begin, row_cells[cell_at(x_high + radius_m - grid.origin_m.x, cells_per_m, grid.num_x) + 1] - begin};
 }
 
-// Lists the strips and walls that may be visible. Each warp of the block processes its share of the candidates.
 __device__ inline void cull_pieces(BlockState* state, CullShared* storage, EntryList* list) {
   const PinholeCamera& camera = state->context.setting.camera;
   const Frustum& frustum = state->context.setting.frustum;
@@ -160,8 +157,8 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
       range = pieces_of_row(pieces_of(geometry, of_walls), storage->sides,
                             of_walls != 0 ? row - rows.count[0] + rows.begin[1] : row + rows.begin[0]);
     }
-    // The pieces of all rows are numbered consecutively, strips first. The offset of a non-empty row is the difference
-    // between a piece's index in the grid and its number.
+    // Pieces of all rows are numbered consecutively, strips first. A row's offset is a piece's grid index minus its
+    // number.
     const bool has_some = range.count > 0;
     const int end = warp_inclusive_sum(range.count), begin = end - range.count;
     const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
@@ -183,8 +180,7 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
     int item = warp_index() * kWarpSize;
     Candidate next;
     if (item < total) next = candidate_of(item);
-    // Software prefetch: the next candidates are loaded before the current ones are tested. Past the end, the last
-    // candidate is loaded again.
+    // Software prefetch of the next candidates.
     PICTURA_NO_UNROLL
     while (item < total) {
       const Candidate candidate = next;
@@ -199,7 +195,6 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
   }
 }
 
-// Lists the front-facing faces of agents that may be visible. Each warp of the block processes its share.
 __device__ inline void cull_agents(const BlockState& state, const DrawTask& task, EntryList* list) {
   const ViewState& view = state.view;
   const ImageSetting& setting = state.context.setting;
@@ -218,7 +213,6 @@ __device__ inline void cull_agents(const BlockState& state, const DrawTask& task
   }
 }
 
-// Lists the light heads with a known state that face the camera and may be visible.
 __device__ inline void cull_lights(const BlockState& state, EntryList* list) {
   const ImageSetting& setting = state.context.setting;
   const Span<const LightHead> heads = state.view.geometry->pieces.heads;

@@ -1,5 +1,4 @@
-// Memory layout of a block: in shared memory, or in global memory for blocks whose data does not fit there. Any
-// function of a kernel can obtain the layout.
+// Memory layout of a block: in shared memory, or in global memory if its data does not fit there.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/block.cuh"
@@ -7,40 +6,37 @@
 
 namespace pictura::cuda {
 
-// Blocks of face set-up have one warp each. An SM runs as many of these blocks as it can hold.
 constexpr int kSetupThreads = 32, kCullBlocksPerProcessor = 32, kFaceSetupBlocksPerProcessor = 32,
               kClipBlocksPerProcessor = 24;
-// Blocks that draw one tile at a time. A tile with more than kDrawFragments fragments is drawn in parts.
+// A tile with more than kDrawFragments fragments is drawn in parts.
 constexpr int kDrawThreads = 256, kDrawBlocksPerProcessor = 4;
 constexpr int kDrawPixels = kTileWidth_px * kTileHeight_px, kDrawFragments = 1152;
-// Few images, usually none, exceed the pool of faces and are deferred.
 constexpr int kDeferredBlocksPerProcessor = 2;
 // Blocks of the overflow launch and of the visibility launch.
 constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 16;
 
-// Number of bits of a 32-bit pixel word that hold a face, and number of faces that these bits can distinguish.
+// Bits of a 32-bit pixel word that hold a face, and the number of such faces.
 constexpr int kMarkedFaceBits = 11, kMaxMarkedFaces = (1 << kMarkedFaceBits) - 1;
 
-/// Arrays for drawing, and the number of threads. Index: type of an index of a face, a pixel or a fragment; 16 bits if
-/// they suffice. Word: type of a pair of indices.
+/// Arrays for drawing. Index: type of an index of a face, pixel or fragment. Word: type of a pair of indices.
 template <typename Index_, typename Word_, int kThreads_>
 struct DrawMemory {
   using Index = Index_;
   using Word = Word_;
   static constexpr int kThreads = kThreads_;
   static constexpr int kHalf = 4 * sizeof(Word);
-  /// Value of a word's lower half if it holds no face or pixel.
+  /// No face or pixel, in a word's lower half.
   static constexpr Word kNone = (Word{1} << kHalf) - 1;
   /// Flag in a candidate's lower half: the face covers the pixel fully.
   static constexpr Word kCoversFully = Word{1} << (kHalf - 1);
-  /// Returns the pixel in the lower half of a candidate.
+  /// coded_pixel: lower half of a candidate.
   __device__ static int pixel_of(uint32_t coded_pixel) {
     return static_cast<int>(coded_pixel & ~static_cast<uint32_t>(kCoversFully));
   }
   __device__ static bool covers_fully(uint32_t coded_pixel) { return (coded_pixel & kCoversFully) != 0; }
 
   BlockState* state;
-  const ScreenFace* faces;   // faces of the image
+  const ScreenFace* faces;
   const PolygonEdge* edges;  // indexed by the faces' edge_begin
   Word* pixels;              // [max_pixels] of the current part, see PixelWord
   Word* rows;                // [max_rows] rows of faces: face in the upper half, row of the part in the lower half
@@ -60,8 +56,8 @@ struct DrawMemory {
   __device__ uint64_t visible(int fragment) const {
     return static_cast<uint64_t>(visible_high[fragment]) << 32 | visible_low[fragment];
   }
-  // After compute_weights, the four words of a fragment's sample masks hold its contribution to the pixel. After
-  // compositing, the words of a list's first fragment hold the pixel's colour, as floats or as bytes.
+  // After compute_weights, a fragment's four sample words hold its contribution to the pixel. After compositing, the
+  // words of a list's first fragment hold the pixel's colour, as floats or bytes.
   __device__ void set_part(int fragment, const PixelAccumulator::Part& part) const {
     samples_low[fragment] = static_cast<uint32_t>(part.area);
     samples_high[fragment] = static_cast<uint32_t>(part.r);
@@ -96,8 +92,8 @@ struct Layout {
   }
 };
 
-// Places the arrays of drawing from `bytes` on, and returns their size in bytes. Rows share memory with the samples,
-// which are written later. Candidates share memory with the visible samples and the list of composited pixels.
+// Places the arrays from `bytes` on, and returns their size in bytes. Rows share memory with samples. Candidates share
+// memory with visible samples and `composited`.
 template <typename Memory>
 __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragments, unsigned char* bytes) {
   memory->max_pixels = max_pixels;
@@ -120,12 +116,12 @@ __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragm
   memory->rows = reinterpret_cast<Word*>(bytes + rows_begin);
   memory->max_rows = static_cast<int32_t>((candidates_begin - rows_begin) / sizeof(Word));
   memory->candidates = reinterpret_cast<Word*>(bytes + candidates_begin);
-  // Most candidates become fragments, so with a longer list, the fragments would exceed max_fragments anyway.
+  // Most candidates become fragments. A longer list would thus exceed max_fragments.
   memory->max_candidates = max_fragments + max_fragments / 2;
   return layout.used;
 }
 
-// Size of a block's state. The state ends with the states of its warps, of which only the existing ones are allocated.
+// Size of a block's state, which ends with the states of its warps.
 __host__ __device__ constexpr size_t state_bytes(int threads) {
   return (sizeof(BlockState) - static_cast<size_t>(kMaxWarps - threads / kWarpSize) * sizeof(WarpState) + 15) / 16 * 16;
 }
@@ -148,7 +144,7 @@ struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t, kDrawThreads> {
 static_assert(kMaxEntries <= kMaxMarkedFaces);
 static_assert(kMaxMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixels < 0x7FFF);
 
-// Drawing memory in global memory. The arrays of drawing share memory with the lists of face set-up.
+// Drawing memory in global memory, shared with the lists of face set-up.
 __host__ __device__ inline size_t lay_out(SetupLists* lists, const Scratch& sizes, unsigned char* bytes) {
   lists->max_entries = FaceBatch::count_of(sizes.max_faces) * FaceBatch::kEntries;
   lists->max_clipped = sizes.max_faces;
@@ -176,7 +172,7 @@ __host__ __device__ inline size_t large_bytes(const Scratch& sizes) {
   return ((to_set_up > to_draw ? to_set_up : to_draw) + 15) / 16 * 16;
 }
 
-// Sets the block's slice of a launch's scratch memory. Collective over all threads of the block.
+// Collective over the block.
 __device__ inline void claim_scratch(const Scratch& scratch) {
   if (threadIdx.x == 0) {
     Scratch own = scratch;

@@ -1,5 +1,4 @@
-// Preparation of drawing on the host: converts a call's arguments to the kernels' arguments, and sorts the pieces of
-// maps for culling.
+// Preparation of drawing on the host: kernel arguments, and map pieces sorted for culling.
 #pragma once
 
 #include <string>
@@ -11,7 +10,7 @@
 
 namespace pictura::cuda {
 
-/// Pieces of one kind, sorted by the grid cells of their centres, in host memory.
+/// Pieces of one kind, sorted by the grid cells of their centres.
 class SortedPieces {
  public:
   explicit SortedPieces(const std::vector<Strip>& strips);
@@ -26,16 +25,15 @@ class SortedPieces {
   float largest_radius_m_ = 0;
 };
 
-/// Makes a task except for the pointers to the renderer's own memory: geometries, pool, counters, lists of images and
-/// fault. `images` may be null.
+/// Makes a task without the renderer's own memory: geometries, pool, counters, lists of images and fault. `images` may
+/// be null.
 DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeCamera>& cameras,
                         const SceneBatch& scene, const ViewBatch& views, const ImageBatch* images);
 
-/// Returns the sizes of a block's scratch memory in the overflow launch (the last one). They suffice for all primitives
-/// of a world with `agents` agents on a map with `pieces` pieces, of which `heads` are light heads.
+/// Returns a block's scratch sizes in the overflow launch, for all primitives of a world. pieces: includes light heads.
 Scratch overflow_sizes(int pieces, int heads, std::size_t agents);
 
-/// Returns the text of a fault, which must not be `none`.
+/// `fault` must not be `none`.
 std::string message_of(const Fault& fault);
 
 }  // namespace pictura::cuda

@@ -1,6 +1,5 @@
 // Face set-up: from entries to faces on screen. Nearly all faces have four corners and need no clipping; one lane sets
-// up one such face. Other faces are listed and clipped in batches. Faces and edges are allocated with atomic counters,
-// so that warps do not wait for each other.
+// up such a face. Other faces are listed and clipped in batches.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/clip.cuh"
@@ -10,8 +9,7 @@
 
 namespace pictura::cuda {
 
-/// Values that a lane loads or stores, as words of 16 bytes. One word of padding limits bank conflicts: there are none
-/// if each lane writes one word to its own row, and at most two-way conflicts if several lanes read a row together.
+/// Values that a lane loads or stores, as words of 16 bytes. One word of padding limits bank conflicts.
 template <typename Value, int kValues = 1>
 struct LaneRow {
   static constexpr int kWords = kValues * sizeof(Value) / sizeof(uint4), kRowsAtOnce = kWarpSize / kWords;
@@ -23,31 +21,27 @@ using StripRow = LaneRow<Strip>;
 using EdgeRow = LaneRow<PolygonEdge, 4>;
 using FaceRow = LaneRow<ScreenFace>;
 
-/// Shared memory of a warp that sets up faces: strips, then the edges of faces, then the faces.
+/// Shared memory of a warp that sets up faces. The members are used in this order.
 union FaceShared {
   StripRow strips[kWarpSize];
   EdgeRow edges[kWarpSize];
   FaceRow faces[kWarpSize];
 };
 
-/// Shared memory of a warp that runs all stages in sequence.
 union GeometryShared {
   CullShared cull;
   FaceShared faces;
   ClipShared clip;
 };
 
-/// Shared memory of a block of pictura_setup_faces. An SM has 256 KiB for shared memory and L1 cache. With the 1 KiB
-/// that CUDA reserves per block, 32 blocks leave 28 KiB of L1 cache. This is enough, because little of the data is read
-/// twice.
+/// Shared memory of a block. With 32 blocks, 28 KiB of the SM's 256 KiB remain for the L1 cache.
 struct FaceSetupState {
   FaceSetupContext contexts[2];  // contexts of this batch and the next, alternating
   FaceShared storage;
 };
 __device__ inline FaceSetupState* face_setup_state() { return reinterpret_cast<FaceSetupState*>(block_memory); }
 
-// cull_bytes() and setup_bytes() return the bytes of shared memory of a block that culls, and of a block that runs all
-// stages. geometry_shared() returns the calling warp's part of the shared memory.
+// Shared memory, in bytes, of a block that culls (cull_bytes) and of a block that runs all stages (setup_bytes).
 __host__ __device__ constexpr size_t cull_bytes() { return state_bytes(kSetupThreads) + sizeof(CullShared); }
 __host__ __device__ constexpr size_t setup_bytes(int threads) {
   return state_bytes(threads) + static_cast<size_t>(threads / kWarpSize) * sizeof(GeometryShared);
@@ -56,13 +50,12 @@ __device__ inline GeometryShared* geometry_shared() {
   return reinterpret_cast<GeometryShared*>(block_memory + state_bytes(num_threads())) + warp_index();
 }
 
-// Loads the strips among the lanes' entries, with four lanes per strip and eight strips together. If each lane loaded
-// its own strip, every memory sector would be requested several times. Collective over all lanes of the warp.
+// Loads the strips among the lanes' entries. Four lanes load a strip together, so that each memory sector is requested
+// once. Collective over the warp.
 __device__ inline void load_strips(const FaceSetupContext& context, uint32_t entry, StripRow* rows_out) {
   const bool is_strip = kind_of(entry) == kStripKind;
   const unsigned strips = __ballot_sync(kAllLanes, is_strip);
   if (strips == 0) return;
-  // Lanes without a strip load the strip of another lane.
   const uint32_t of_another = __shfl_sync(kAllLanes, entry, __ffs(static_cast<int>(strips)) - 1);
   const uint32_t index = (is_strip ? entry : of_another) & kFaceIndexMask;
   constexpr int kWords = StripRow::kWords, kRowsAtOnce = StripRow::kRowsAtOnce;
@@ -76,14 +69,13 @@ __device__ inline void load_strips(const FaceSetupContext& context, uint32_t ent
   __syncwarp();
 }
 
-// Makes the face of an entry that is not a light. Returns false if the face has faded to black. strip_of(index) must
-// return the strip of that index.
+// Makes the face of an entry that is not a light. Returns false if the face has faded to black.
 template <typename StripOf>
 __device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad* quad_out, StripOf&& strip_of) {
   const ImageSetting& setting = context.setting;
   const uint32_t kind = kind_of(entry);
   const auto index = static_cast<int32_t>(entry & kFaceIndexMask);
-  // Only the corners are computed per kind, to limit divergence: lanes of a warp have different kinds.
+  // Only the corners are computed per kind, to limit divergence.
   WorldQuad world;
   quad_out->floor_px = 0.0f;
   if (kind == kStripKind) {
@@ -102,20 +94,18 @@ __device__ bool make_quad(const FaceSetupContext& context, uint32_t entry, Quad*
   return quad_to_camera(world, setting.camera, &quad_out->in_camera);
 }
 
-// Stores the face of each lane whose `at` is not negative. Every image has capacity for all of its faces.
 __device__ inline void store_face(const FaceSetupContext& context, const ScreenFace& face, PrimitiveRef primitive,
                                   int32_t edge_begin, int32_t at) {
   if (at >= 0) store_words(context.faces + at, complete_face(face, primitive, edge_begin));
 }
 
-// Stores the first `count` rows contiguously, with 512 bytes per warp at a time: if each lane stored its own row,
-// memory transactions would be half empty.
+// Stores the first `count` rows contiguously, 512 bytes per warp at a time, to fill memory transactions.
 template <typename Row>
 __device__ void store_rows(uint4* to, Row* rows, int count) {
   constexpr int kWords = Row::kWords, kRowsAtOnce = Row::kRowsAtOnce;
   const int row = lane_index() / kWords, word = lane_index() % kWords, left = count - row;
   uint4* const own = to + lane_index();
-  // Four words are read before the first is stored, so that their latencies overlap.
+  // Four words are read before they are stored, so that their latencies overlap.
   constexpr int kAtOnce = 4;
   for (int first = 0; first < kWords; first += kAtOnce) {
     uint4 words[kAtOnce];
@@ -126,8 +116,7 @@ __device__ void store_rows(uint4* to, Row* rows, int count) {
   }
 }
 
-// Sets up the faces of a batch of the image, one entry per lane, and lists those that need clipping. Collective over
-// all lanes of the warp.
+// Sets up the faces of a batch, one entry per lane, and lists faces that need clipping. Collective over the warp.
 __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* storage, const SetupLists& lists,
                                   SetupCounts* counts, uint32_t entry, int32_t image) {
   const bool is_light = entry != kNoEntry && kind_of(entry) == kLightKind, is_quad = entry != kNoEntry && !is_light;
@@ -137,7 +126,7 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   }
   const unsigned quads = __ballot_sync(kAllLanes, is_quad);
   if (quads == 0) return;
-  // Lanes without a face compute the face of another lane without storing it, so the warp does not diverge.
+  // Lanes without a face compute another lane's face, so that the warp does not diverge.
   const uint32_t of_another = __shfl_sync(kAllLanes, entry, __ffs(static_cast<int>(quads)) - 1);
   const PinholeCamera& camera = context.setting.camera;
   Quad quad;
@@ -153,8 +142,7 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
              is_wanted = is_quad && is_not_black;
   const bool is_visible = is_wanted && clip_class == ClipClass::inside && passes_culling,
              is_clipped = is_wanted && clip_class == ClipClass::crossing;
-  // Two lanes allocate for the whole warp: one allocates faces, the other clipped entries. The results are needed only
-  // after the edges are made.
+  // Lane 0 allocates the warp's faces; lane 1 allocates its clipped entries.
   const unsigned visible = __ballot_sync(kAllLanes, is_visible), clipped = __ballot_sync(kAllLanes, is_clipped);
   const int lane = lane_index(), wanted = __popc(lane == 0 ? visible : (lane == 1 ? clipped : 0u));
   int32_t taken = 0;
@@ -171,7 +159,6 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   __syncwarp();
   const int32_t at = __shfl_sync(kAllLanes, taken, 0), clipped_at = __shfl_sync(kAllLanes, taken, 1);
   if (is_clipped) lists.clipped[clipped_at + __popc(clipped & lanes_below())] = {entry, image};
-  // The index of a face's edges follows from the face's index.
   const int32_t edge_begin = context.edge_begin + 4 * at;
   store_rows(reinterpret_cast<uint4*>(context.edges + edge_begin), storage->edges, count);
   __syncwarp();
@@ -182,8 +169,7 @@ __device__ inline void make_faces(const FaceSetupContext& context, FaceShared* s
   store_rows(reinterpret_cast<uint4*>(context.faces + at), storage->faces, count);
 }
 
-// Sets up a face whose corners are distributed over the lanes. Returns false if the face's edges do not fit into
-// memory. Collective over all lanes of the warp.
+// Sets up a face with one corner per lane. Returns false if its edges do not fit into memory. Collective over the warp.
 __device__ inline bool make_warp_face(const FaceSetupContext& context, ClipShared* storage, WarpFace warp_face) {
   clip(context.setting.frustum, storage, &warp_face);
   if (warp_face.count == 0) return true;
@@ -198,9 +184,8 @@ __device__ inline bool make_warp_face(const FaceSetupContext& context, ClipShare
   return true;
 }
 
-// Clips the faces of lanes with is_active and sets them up, except for faces with too many corners for a lane: for
-// these, *quad_out is set and has_too_many_corners_out is true. Returns false in lanes whose edges do not fit.
-// Collective over all lanes of the warp.
+// Clips and sets up the faces of active lanes. Faces with too many corners for a lane only set *quad_out and
+// *has_too_many_corners_out. Returns false in lanes whose edges do not fit. Collective over the warp.
 __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* storage, bool is_active,
                                   ClippedPrimitive primitive, Quad* quad_out, bool* has_too_many_corners_out) {
   const FaceSetupContext& context = contexts[primitive.image];
@@ -218,7 +203,6 @@ __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* 
   ScreenBounds bounds;
   bool is_clockwise = false;
   const unsigned edges = kept > 0 ? project_in_place(camera, corners, kept, &bounds, &is_clockwise) : 0;
-  // The edges of all lanes are stored contiguously.
   const int count = __popc(edges), end = warp_inclusive_sum(count), total = __shfl_sync(kAllLanes, end, kWarpSize - 1);
   int32_t edge_begin = 0;
   if (lane_index() == 0 && total > 0) edge_begin = context.clipped_begin + atomicAdd(context.num_clipped, total);
@@ -251,9 +235,8 @@ __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* 
   return fits;
 }
 
-// Clips the primitives of lanes with is_active and sets up their faces; primitive.image indexes contexts. Either all
-// primitives are lights, or none is a light. Returns false in lanes whose edges do not fit. Collective over all lanes
-// of the warp.
+// Clips the primitives of active lanes and sets up their faces. Either all primitives are lights, or none is a light.
+// Returns false in lanes whose edges do not fit. Collective over the warp.
 __device__ inline bool clip_primitives(const FaceSetupContext* contexts, ClipShared* storage, bool is_active,
                                        bool are_lights, ClippedPrimitive primitive) {
   Quad quad;
@@ -272,8 +255,8 @@ __device__ inline bool clip_primitives(const FaceSetupContext* contexts, ClipSha
   return fits;
 }
 
-// A unit of clipping work for a warp: one light, set up by all lanes together, or `batch` faces of four corners, one
-// per lane. Lights come first because they take longest.
+// Clipping work for a warp: one light, or `batch` faces of four corners, one per lane. Lights come first because they
+// take longest.
 struct ClippedItem {
   bool exists, are_lights;
   bool is_active;  // this lane has a primitive
@@ -287,8 +270,8 @@ __device__ inline ClippedItem clipped_item(const SetupLists& lists, const SetupC
           lists.clipped[are_lights ? lists.max_clipped - 1 - item : min_of(quad, listed.clipped - 1)]};
 }
 
-// Sets the context of an image except for its outputs. Returns false and records a fault if its view refers to
-// something that does not exist. Called by one thread.
+// Sets the context of an image except for its outputs. Returns false and records a fault if its view is invalid. Called
+// by one thread.
 __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_t view, int32_t camera) {
   if (!set_view(&state->view, task, view)) return false;
   FaceSetupContext* context = &state->context;
@@ -314,13 +297,12 @@ __device__ inline bool set_image(BlockState* state, const DrawTask& task, int32_
   return true;
 }
 
-// Selects as occluders the faces of largest area among those passed to add(). Lane i holds the entry and area of
-// occluder i; the occluder itself is in the context's setting.
+// Selects the faces of largest area as occluders. Lane i holds the entry and area of occluder i.
 class BestOccluders {
  public:
   __device__ explicit BestOccluders(FaceSetupContext* context) : context_(context) {}
 
-  /// Offers the face of each active lane's entry for selection. Collective over all lanes of the warp.
+  /// Offers the face of each active lane's entry. Collective over the warp.
   __device__ void add(bool is_active, uint32_t entry) {
     const ImageSetting& setting = context_->setting;
     const FaceSetupContext* context = context_;
@@ -338,7 +320,7 @@ class BestOccluders {
     }
   }
 
-  /// Number of selected occluders. Collective over all lanes of the warp.
+  /// Collective over the warp.
   __device__ int count() const { return __popc(__ballot_sync(kAllLanes, kept_area_bits_ != 0)); }
 
  private:
@@ -348,7 +330,7 @@ class BestOccluders {
     ScreenQuad on_screen;
     bool is_clockwise = false;
   };
-  // Whether the face that the lane adds, and the face that it already holds, are among the best.
+  // Whether the lane's added face and its held face are among the best.
   struct Chosen {
     bool own = false, kept = false;
   };
@@ -374,7 +356,7 @@ class BestOccluders {
     return chosen;
   }
 
-  // Puts the chosen added faces into the slots of faces that were not chosen. Returns the slot of the lane's own face.
+  // Puts the chosen added faces into slots of held faces that were not chosen. Returns the lane's slot.
   __device__ int insert(const Offered& own, Chosen chosen) {
     unsigned slots = ~__ballot_sync(kAllLanes, chosen.kept) & ((1u << Occluders::kMaxCount) - 1);
     int slot = 0;
@@ -397,7 +379,7 @@ class BestOccluders {
   int kept_area_bits_ = 0;
 };
 
-// Finds the occluders among the solids of a list. Collective over all lanes of one warp.
+// Finds the occluders among a list's solids. Collective over one warp.
 __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t* entries, int32_t count) {
   auto is_candidate = [&](uint32_t entry) {
     const PinholeCamera& camera = context->setting.camera;
@@ -407,7 +389,6 @@ __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t*
     return kind_of(entry) == kWallKind && may_occlude(context->walls[index], camera);
   };
   BestOccluders best(context);
-  // Near solids are queued until every lane has one.
   WarpQueue queue(&block_state()->warps[warp_index()].queue);
   PICTURA_NO_UNROLL
   for (int32_t first = 0;; first += kWarpSize) {
@@ -425,12 +406,11 @@ __device__ inline void find_occluders(FaceSetupContext* context, const uint32_t*
   __syncwarp();
 }
 
-// Returns the description of an image for drawing.
 __device__ inline PreparedImage image_of(const BlockState& state, int32_t face_begin, int32_t face_count) {
   return {state.view.geometry, state.context.agents, face_begin, face_count};
 }
 
-/// Memory in which a block sets up an image by itself.
+/// Memory in which a block sets up an image.
 struct SetupTarget {
   ScreenFace* faces;
   PolygonEdge* edges;
@@ -438,15 +418,15 @@ struct SetupTarget {
   SetupLists lists;
 };
 
-// Returns the block's scratch memory, whose lists have capacity for a whole world.
+// Returns the block's scratch memory, which suffices for a whole world.
 __device__ inline SetupTarget setup_target_of(const Scratch& scratch) {
   SetupTarget target{scratch.faces, scratch.edges, 0, 4 * scratch.max_faces, scratch.max_edges, {}};
   lay_out(&target.lists, scratch, scratch.bytes);
   return target;
 }
 
-// Culls, sets up and clips the faces of an image in the block's own memory. Returns false if they do not fit, or if the
-// view refers to something that does not exist. Collective over all threads of the block.
+// Culls, sets up and clips an image's faces in the block's memory. Returns false if they do not fit, or if the view is
+// invalid. Collective over the block.
 __device__ inline bool prepare_image(const DrawTask& task, int32_t view, int32_t camera, const SetupTarget& target,
                                      bool culls_occluded) {
   BlockState* state = block_state();

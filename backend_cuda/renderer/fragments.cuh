@@ -1,6 +1,6 @@
-// Conversion of an image's faces to fragments. Threads first process the rows of faces. They find, for each pixel, the
-// fully covering face with the largest occluder bound, and list the pixels that faces cover partly. Each listed pair of
-// face and pixel that may be visible becomes a fragment: one thread per pair, one linked list per pixel.
+// From faces to fragments. Threads first process rows of faces: they find each pixel's full face (the fully covering
+// face with the largest occluder bound), and list partly covered pixels as candidates. A candidate that may be visible
+// becomes a fragment in its pixel's linked list.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/draw_memory.cuh"
@@ -10,15 +10,13 @@
 
 namespace pictura::cuda {
 
-// Returns the tile at (x, y) of the given size, clipped to an image of this width whose rows end at y_end.
 __device__ inline Part tile_at(int x, int y, int columns, int rows, int width_px, int y_end) {
   return {x, min_of(x + columns, width_px), y, min_of(y + rows, y_end)};
 }
 
-/// Word of a pixel. While fully covering faces are sought, the upper bits hold the largest occluder bound, as bits that
-/// sort like the bound. The lower bits hold the index of the bound's face plus 1. Once the pixel has a fragment, the
-/// upper bits hold the first fragment of its list, and the sign bit is set. The word is 0 if the pixel has neither a
-/// face nor a fragment.
+/// Word of a pixel; 0 if it has neither a face nor a fragment. Lower bits: index of its full face plus 1. Upper bits:
+/// the face's occluder bound, as bits that sort like it. If the sign bit is set, they hold the first fragment of the
+/// pixel's list.
 template <typename Word>
 struct PixelWord {
   static constexpr int kFaceBits = sizeof(Word) == 4 ? kMarkedFaceBits : 32;
@@ -33,14 +31,13 @@ struct PixelWord {
     constexpr uint32_t kBoundMask = ~0u << kMarkedFaceBits;
     return float_from_bits(static_cast<uint32_t>(mark >> (kFaceBits - kMarkedFaceBits)) & kBoundMask);
   }
-  /// Returns the word with its first fragment replaced and its face kept.
+  /// Replaces the first fragment and keeps the face.
   __device__ static Word with_first(Word word, Word fragment) {
     return kHasFragments | fragment << kFaceBits | (word & kFace);
   }
 };
 
-// Returns the pixel's fully covering face with the largest occluder bound. Returns kNone if there is no such face, or
-// if the face is in the pixel's fragment list.
+// Returns the pixel's full face. Returns kNone if there is none, or if the face is in the pixel's fragment list.
 template <typename Memory>
 __device__ typename Memory::Word full_of_word(typename Memory::Word word) {
   return ((word & PixelWord<typename Memory::Word>::kFace) - 1) & Memory::kNone;
@@ -60,8 +57,7 @@ __device__ typename Memory::Word first_of(const Memory& memory, int pixel) {
   return first_of_word<Memory>(memory.pixels[pixel]);
 }
 
-// Lists the rows of faces in a part. Rows beyond max_rows are counted but not stored. Collective over all threads of
-// the block.
+// Lists the rows of faces in a part. Rows beyond max_rows are counted but not stored. Collective over the block.
 template <typename Memory>
 __device__ void list_rows(const Memory& memory, int num_faces, const Part& part) {
   using Word = typename Memory::Word;
@@ -88,7 +84,6 @@ __device__ void list_rows(const Memory& memory, int num_faces, const Part& part)
   }
 }
 
-// Stores a candidate unless the list is full.
 template <typename Memory>
 __device__ void list_candidate(const Memory& memory, int index, int face, int pixel, bool covers_fully) {
   using Word = typename Memory::Word;
@@ -97,8 +92,8 @@ __device__ void list_candidate(const Memory& memory, int index, int face, int pi
                              (covers_fully ? Memory::kCoversFully : Word{0});
 }
 
-// Marks a pixel with a face that covers it fully, unless the pixel's current face has a larger occluder bound. Of these
-// two faces, returns the face with the lower bound if it may still be visible in front of the other face, else -1.
+// Marks a pixel with a fully covering face, unless its current face has a larger occluder bound. Returns the face with
+// the lower bound if it may still be visible, else -1.
 template <typename Memory>
 __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixel) {
   using Word = typename Memory::Word;
@@ -112,8 +107,7 @@ __device__ int mark_pixel(const Memory& memory, int face, int x, int y, int pixe
   return passes_occluder_bound(memory.faces[farther], bound, x, y) ? farther : -1;
 }
 
-// A row of a face within a tile, as four column numbers relative to the tile. Each number is one byte, so that one
-// shuffle passes all of them to another lane.
+// A row of a face within a tile: four column numbers relative to the tile, one byte each.
 static_assert(kTileWidth_px <= 255);
 struct TileSpan {
   uint32_t bytes = 0;
@@ -130,13 +124,12 @@ struct TileSpan {
   __device__ int full_end() const { return static_cast<int>(bytes >> 16 & 0xFF); }
   __device__ int end() const { return static_cast<int>(bytes >> 24); }
   __device__ int num_full() const { return full_end() - full_begin(); }
-  /// Returns the k-th partly covered column; partly covered columns lie on both sides of the fully covered ones.
+  /// Returns the k-th partly covered column, left or right of the fully covered columns.
   __device__ int partial(int k) const { return begin() + k + (begin() + k < full_begin() ? 0 : num_full()); }
 };
 
-// Marks, for each pixel of a part, the fully covering face with the largest occluder bound, and lists the partly
-// covered pixels. Neighbouring rows often belong to one large face, so the lanes of a warp take rows that are far
-// apart. Collective over all threads of the block.
+// Marks each pixel of a part with its full face, and lists the partly covered pixels. The lanes of a warp take distant
+// rows, because neighbouring rows often belong to one large face. Collective over the block.
 template <typename Memory>
 __device__ void mark_and_list(const Memory& memory, const Part& part) {
   using Word = typename Memory::Word;
@@ -185,7 +178,7 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
   }
 }
 
-// Whether a fragment is the only fragment of its pixel and the pixel has no full face.
+// Whether a pixel has only this fragment and no full face.
 template <typename Memory>
 __device__ bool is_alone(const Memory& memory, int fragment, int pixel) {
   using Word = typename Memory::Word;
@@ -209,7 +202,6 @@ __device__ void store_fragment(const Memory& memory, int fragment, uint32_t face
   memory.next[fragment] = static_cast<Index>(first_of_word<Memory>(before));
 }
 
-// Makes a fragment from each lane's candidate unless its coverage is empty.
 template <typename Memory>
 __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, const Part& part) {
   const int pixel = Memory::pixel_of(candidate.b);
@@ -226,8 +218,8 @@ __device__ void make_fragment(const Memory& memory, WarpQueue::Pair candidate, c
   store_fragment(memory, fragment, candidate.a, pixel, coverage.samples, coverage.area);
 }
 
-// Makes fragments from the candidates that pass their pixel's occluder bound. Warps queue them until every lane has
-// one. Collective over all threads of the block.
+// Makes fragments from the candidates that pass their pixel's occluder bound. Warps queue candidates until every lane
+// has one. Collective over the block.
 template <typename Memory>
 __device__ void make_fragments(const Memory& memory, const Part& part) {
   WarpQueue queue(&memory.state->warps[warp_index()].queue);
@@ -254,7 +246,6 @@ __device__ void make_fragments(const Memory& memory, const Part& part) {
   }
 }
 
-// Whether wanted(coverage) holds for any fragment of a list from `at` on.
 template <typename Memory, typename Wanted>
 __device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wanted&& wanted) {
   PICTURA_NO_UNROLL
@@ -264,10 +255,9 @@ __device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wan
   return false;
 }
 
-// Makes all effective samples of a fragment visible initially. A fragment that covers its pixel fully may intersect the
-// pixel's full face, which then becomes a fragment too. Lists the pixels to be composited: those with fragments that
-// are not alone (is_alone()). Records whether divide_remainder() may be needed: whether several fragments cover a pixel
-// fully, and one that is no sliver covers it partly. Hardly any pixel has such fragments.
+// Makes all effective samples of each fragment visible. If a fragment covers its pixel fully, the pixel's full face
+// becomes a fragment too, because both may intersect. Lists the pixels whose fragments are not alone. Sets
+// state->divides if several fragments cover a pixel fully, and another covers it partly and is no sliver.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;
@@ -280,7 +270,7 @@ __device__ void finish_fragments(const Memory& memory, int count) {
   PICTURA_NO_UNROLL
   for (int first = warp_index() * kWarpSize; first < count; first += Memory::kThreads) {
     const int i = first + lane_index();
-    // The thread of the last fragment of a pixel's list adds the pixel to the composited pixels.
+    // The thread of a list's last fragment adds the pixel.
     const bool is_listed =
         i < count && memory.next[i] == static_cast<Index>(Memory::kNone) && !is_alone(memory, i, memory.pixel[i]);
     const int32_t index = warp_allocate_one(&memory.state->num_composited, is_listed);
@@ -293,8 +283,8 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     auto is_full = [](const PixelCoverage& coverage) { return coverage.is_full(); };
     auto hides = [](const PixelCoverage& coverage) { return !coverage.is_full() && coverage.samples != 0; };
     const Word first_of_list = first_of_word<Memory>(before);
-    // Among several full fragments, the first in the list finds those later in the list. If the list begins with a
-    // fragment that another thread has added, that thread decides, because the list may not be linked yet.
+    // The first of several full fragments finds the others. If another thread has added the list's first fragment, that
+    // thread decides, because the list may not be linked yet.
     if ((full != Memory::kNone || any_fragment(memory, Word{memory.next[i]}, is_full)) &&
         first_of_list < static_cast<Word>(count) && any_fragment(memory, first_of_list, hides)) {
       atomicOr(&memory.state->divides, 1);

@@ -1,4 +1,4 @@
-// A renderer's maps in device memory, and their table, which kernels index by handle.
+// A renderer's maps in device memory, indexed by handle.
 #pragma once
 
 #include <memory>
@@ -11,16 +11,15 @@
 
 namespace pictura::cuda {
 
-/// Table of maps. In all calls the table's device must be the current device, and the caller must have checked the
-/// handles. Memory of a replaced or released map is kept until the stream has completed all earlier work, and is then
-/// reused.
+/// Table of maps. Callers make its device current and check the handles. Memory of a replaced or released map is reused
+/// after the stream has completed all earlier work.
 class GeometryTable {
  public:
   /// Copies an empty table to the device on the default stream.
   GeometryTable() { grow(kMinEntries, nullptr); }
 
-  /// Writes a map and its entry. Waits for the stream. After that, the caller may free the host's copy, and no kernel
-  /// reads the replaced map any more.
+  /// Writes a map and its entry, and waits for the stream. Then no kernel reads the replaced map, and the caller may
+  /// free `geometry`.
   void upload(GeometryHandle handle, const StaticGeometry& geometry, cudaStream_t stream);
   /// Empties an entry, on the stream.
   void release(GeometryHandle handle, cudaStream_t stream);
@@ -29,7 +28,7 @@ class GeometryTable {
   int32_t num_entries() const { return static_cast<int32_t>(maps_.size()); }
   /// Number of times that the table's address has changed.
   uint64_t generation() const { return generation_; }
-  /// Maximum numbers of pieces and of light heads over all held maps.
+  /// Maxima over all held maps.
   int max_pieces() const { return max_pieces_; }
   int max_heads() const { return max_heads_; }
 
@@ -37,7 +36,7 @@ class GeometryTable {
   static constexpr std::size_t kMinEntries = 16;
 
   struct Map {
-    DeviceBuffer<std::byte> memory;  // all arrays of the map
+    DeviceBuffer<std::byte> memory;
     int pieces = 0, heads = 0;
     DeviceGeometry entry = empty_entry();
   };
@@ -52,15 +51,14 @@ class GeometryTable {
   };
 
   void grow(std::size_t entries, cudaStream_t stream);
-  /// Swaps a map with the map of an entry, on the host.
   void swap_map(std::size_t index, Map* map_inout);
   void retire(DeviceBuffer<std::byte> memory, cudaStream_t stream);
   DeviceBuffer<std::byte> allocate(std::size_t bytes);
 
-  std::vector<Map> maps_;  // [handle], one per entry of the table
+  std::vector<Map> maps_;  // [handle]
   DeviceBuffer<DeviceGeometry> table_;
   std::vector<Retired> retired_;
-  int max_pieces_ = 0, max_heads_ = 0;  // cached, so that drawing calls need not search all maps
+  int max_pieces_ = 0, max_heads_ = 0;  // cached for drawing calls
   uint64_t generation_ = 0;
 };
 

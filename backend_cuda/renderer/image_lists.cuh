@@ -1,6 +1,5 @@
-// Lists of images, and allocation of an image's memory in the pool. One list contains the images that are drawn from
-// the pool, the most expensive first. Another contains images that are deferred until the pool is free. The third
-// contains images that are left to the last launch.
+// Allocation of images in the pool, and three lists of images: drawn from the pool, deferred until the pool is free,
+// and left to the overflow launch.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/face_setup.cuh"
@@ -13,8 +12,7 @@ __device__ inline int32_t view_of(const DrawTask& task, int32_t image) {
 }
 __device__ inline int32_t camera_of(const DrawTask& task, int32_t image) { return image % num_cameras(task); }
 
-// Returns the number of the launch's views that are drawn. Views beyond the caller's count are not drawn. A count
-// outside [0, max_views] is a fault.
+// Returns how many of the launch's views are below the caller's count. A count outside [0, max_views] is a fault.
 __device__ inline int32_t num_drawn_views(const DrawTask& task) {
   if (task.view_count == nullptr) return task.num_views;
   const int32_t count = *task.view_count, drawn = clamp(count, 0, task.max_views);
@@ -22,17 +20,14 @@ __device__ inline int32_t num_drawn_views(const DrawTask& task) {
   return clamp(drawn - task.first_view, 0, task.num_views);
 }
 
-// Leaves an image to the last launch, whose blocks have memory for a whole world.
 __device__ inline void mark_overflowed(const DrawTask& task, int32_t image) {
   task.overflow_images[atomicAdd(&task.counters->overflow, 1)] = image;
 }
 
-// Defers, until the pool is free again, an image that does not fit into it.
 __device__ inline void defer(const DrawTask& task, int32_t image) {
   task.deferred_images[atomicAdd(&task.counters->deferred, 1)] = image;
 }
 
-// Returns the images of a cost bucket that are drawn from the pool.
 __device__ inline int32_t* images_of_bucket(const DrawTask& task, int bucket) {
   return task.drawn_images + static_cast<int64_t>(bucket) * task.num_views * num_cameras(task);
 }
@@ -40,11 +35,11 @@ __device__ inline void list_drawn(const DrawTask& task, int32_t image, int32_t l
   const int bucket = min_of(listed / kFacesPerCostBucket, kNumCostBuckets - 1);
   images_of_bucket(task, bucket)[atomicAdd(&task.counters->cost_buckets[bucket], 1)] = image;
 }
-// Iterates over the images of all buckets, the most expensive bucket first.
+// Iterates over all buckets' images, the most expensive bucket first.
 class DrawOrder {
  public:
   __device__ explicit DrawOrder(const DrawTask& task) : task_(task) {}
-  /// Returns image number `turn` in this order; -1 after the last image. `turn` must not decrease from call to call.
+  /// Returns image number `turn`; -1 after the last image. `turn` must not decrease from call to call.
   __device__ int32_t image_of(int32_t turn) {
     const int32_t* cost_buckets = task_.counters->cost_buckets;
     PICTURA_NO_UNROLL
@@ -62,8 +57,8 @@ class DrawOrder {
   int32_t begin_ = 0;  // number of the bucket's first image
 };
 
-// Allocates the faces of an image with `listed` entries, and lists the image for drawing. Returns its first batch, or
-// -1 if the image was deferred or overflowed. Called by one thread.
+// Allocates the faces of an image with `listed` entries, and lists the image. Returns its first batch; -1 if the image
+// was deferred or overflowed. Called by one thread.
 __device__ inline int32_t allocate_faces(const DrawTask& task, int32_t image, int32_t listed) {
   BlockState* state = block_state();
   FaceSetupContext* context = &state->context;
@@ -92,7 +87,6 @@ __device__ inline int32_t allocate_faces(const DrawTask& task, int32_t image, in
   return first_batch;
 }
 
-// Returns the entries of an image.
 __device__ inline uint32_t* entries_of(const SetupLists& lists, int32_t image) {
   return lists.entries + static_cast<int64_t>(image) * lists.max_entries;
 }

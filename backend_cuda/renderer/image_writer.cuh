@@ -1,5 +1,4 @@
-// Writers of pixels. One writes bytes, halves, floats or bfloat16s, in one plane per channel or as patches, with
-// several neighbouring pixels per store. The other writes nothing.
+// Writers of pixels: one for all formats and orders, and one that writes nothing.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/fragments.cuh"
@@ -9,16 +8,15 @@
 
 namespace pictura::cuda {
 
-/// Writes the pixels of one image.
 struct ImageWriter {
   PixelFormat format;
   ChannelOrder order;
   void* images;
-  int64_t first, plane;  // in elements: the image's offset, and the stride of planes
+  int64_t first, plane;  // in elements: offset of the image, stride of planes
   int width_px, height_px;
-  int patch_px;  // side of the patches, if the order is patches
+  int patch_px;  // if the order is patches
 
-  /// Stores the colour of a pixel that has a fragment list. The colour is stored in the list's first fragment.
+  /// Stores the colour of a pixel with fragments, in the first fragment of its list.
   template <typename Memory>
   __device__ void store_color(const Memory& memory, int fragment, Rgb color) const {
     if (has_bytes()) {
@@ -48,12 +46,11 @@ struct ImageWriter {
   struct alignas(kPixelsPerWrite * sizeof(Value)) PixelVector {
     Value value[kPixelsPerWrite];
   };
-  // A number of neighbouring pixels from (x, y) on.
+  // `count` neighbouring pixels from (x, y) on.
   struct Place {
     int x, y, count;
   };
-  // Returns the index of a place in patches. Division by a constant is several times as fast as by patch_px, and all
-  // threads take the same branch.
+  // Division by a constant is several times as fast as by patch_px.
   __device__ int64_t place_in_patch(const Place& place) const {
     switch (patch_px) {
       case 8: return place_in_patches(8, width_px, 0, place.x, place.y);
@@ -63,8 +60,7 @@ struct ImageWriter {
     }
   }
 
-  // Calls change(effect, i) for each pixel if the image has an effect; values beyond the image stay black. The effect
-  // is in shared memory, because no registers are left.
+  // Calls change(effect, i) for each pixel if the image has an effect.
   template <typename Change>
   __device__ void for_each_pixel_with_effect(const Place& place, Change&& change) const {
     if constexpr (kRandomizesCameras) {
@@ -81,7 +77,7 @@ struct ImageWriter {
   template <typename Memory, typename Value, typename ValueOf>
   __device__ void write_bytes(const Memory& memory, Value* all, const Place& place, const typename Memory::Word* words,
                               ValueOf&& value_of) const {
-    // Skips the lookups for black words: many warps write only black.
+    // Skips lookups for black words, because many warps write only black.
     uint32_t bytes[kPixelsPerWrite] = {};
     typename Memory::Word some = 0;
     for (int i = 0; i < kPixelsPerWrite; ++i) some |= words[i];
@@ -116,7 +112,7 @@ struct ImageWriter {
     });
   }
 
-  // Stores all channels; value_of(i, channel) is a channel of the i-th pixel.
+  // value_of(i, channel): channel of the i-th pixel.
   template <typename Value, typename ValueOf>
   __device__ void store_channels(Value* image, const Place& place, ValueOf&& value_of) const {
     auto store_each = [&](Value* to, int64_t step, int count) {
@@ -127,7 +123,7 @@ struct ImageWriter {
         store(to, count, values);
       }
     };
-    // Planes have a separate path: otherwise each store would test whether a patch ends there.
+    // Planes need no test for the end of a patch.
     if (order != ChannelOrder::patches) {
       store_each(image + static_cast<int64_t>(place.y) * width_px + place.x, plane, place.count);
       return;
@@ -140,8 +136,7 @@ struct ImageWriter {
     if (is_right || place.y + 1 == height_px) blacken_beyond(image, place, width_px, height_px, patch_px);
   }
 
-  // Blackens the part of these pixels' patch that lies beyond the image, to the right and below. It is not inlined,
-  // because few threads need it, but all would reserve its registers.
+  // Blackens these pixels' patch beyond the image. It is not inlined, to save registers.
   template <typename Value>
   __device__ __noinline__ static void blacken_beyond(Value* image, Place place, int width_px, int height_px,
                                                      int patch_px) {
@@ -152,7 +147,7 @@ struct ImageWriter {
     for (int channel = 0; channel < 3; ++channel, to += patch_px * patch_px) {
       PICTURA_NO_UNROLL
       for (int row = 0; row < rows; ++row) {
-        // The pixels themselves are already written, up to the next multiple of kPixelsPerWrite.
+        // The pixels are already written, up to the next multiple of kPixelsPerWrite.
         PICTURA_NO_UNROLL
         for (int x = row == 0 ? kPixelsPerWrite - place.x % kPixelsPerWrite : 0; x < columns; x += kPixelsPerWrite) {
           store(to + row * patch_px + x, min_of(columns - x, kPixelsPerWrite), PixelVector<Value>{});
@@ -161,7 +156,7 @@ struct ImageWriter {
     }
   }
 
-  // Stores pixels with one vector store if all are written and the address is aligned.
+  // Uses one vector store if all pixels are written and the address is aligned.
   template <typename Value>
   __device__ static void store(Value* to, int count, const PixelVector<Value>& values) {
     if (count == kPixelsPerWrite && reinterpret_cast<uintptr_t>(to) % sizeof(values) == 0) {
@@ -174,7 +169,6 @@ struct ImageWriter {
   }
 };
 
-/// Writer that writes nothing.
 struct NoImage {
   template <typename Memory>
   __device__ void store_color(const Memory&, int, Rgb) const {}

@@ -1,7 +1,7 @@
 // Arguments of the drawing kernels. Three launches (cull, set up, clip) prepare the faces of all images in a memory
-// pool. The next launch draws these images, one block per tile. A further launch draws the images that did not fit into
-// the pool, one block per image. Images that exceed a block's memory go to a last launch of few blocks, each with
-// memory for a whole world.
+// pool. The fourth draws these images, one block per tile. The fifth draws deferred images, which did not fit into the
+// pool, one block per image. The last (overflow) draws images that exceed a block's memory, in few blocks with memory
+// for a whole world.
 #pragma once
 
 #include "pictura/common/patches.h"
@@ -10,15 +10,13 @@
 
 namespace pictura::cuda {
 
-/// Images are sorted into buckets by their number of entries (objects that may be visible, see cull.cuh). Expensive
-/// images are drawn first, so that the last tiles are cheap.
+/// Buckets of images by number of entries (objects that may be visible). Expensive buckets are drawn first.
 constexpr int kNumCostBuckets = 16, kFacesPerCostBucket = 64;
 
-/// Number of neighbouring pixels of a row that a thread writes with one store.
+/// Neighbouring pixels of a row that a thread writes with one store.
 constexpr int kPixelsPerWrite = 4;
 
-/// Maximum tile size. Tiles are higher than wide because distant primitives are concentrated along the horizon. Tiles
-/// are narrower if there are few images, so that blocks end at about the same time.
+/// Maximum tile size. Tiles are higher than wide because distant primitives lie along the horizon.
 constexpr int kTileWidth_px = 48, kNarrowTile_px = 32, kTileHeight_px = 54;
 /// Tiles of an image: equally wide, except for the last column.
 struct TileGrid {
@@ -31,7 +29,7 @@ PICTURA_HD constexpr TileGrid tiles_of(int max_px, int width_px, int height_px) 
   return {together, parts_of(width_px, together), parts_of(height_px, kTileHeight_px)};
 }
 
-/// Outputs of one camera's optional planes. A plane with a null pointer is not written.
+/// Outputs of one camera's optional planes. Null planes are not written.
 struct CameraPlanes {
   float* depth_m = nullptr;
   uint8_t* class_id = nullptr;
@@ -39,31 +37,31 @@ struct CameraPlanes {
   PICTURA_HD bool are_wanted() const { return depth_m || class_id || instance_id; }
 };
 
-/// A camera of the rig with derived values and its outputs; strides as in CameraImages.
+/// A camera and its outputs; strides as in CameraImages.
 struct CameraSlot {
   PinholeCamera camera;  // in the ego frame
-  Frustum frustum;       // in camera coordinates; depends on a randomized focal length, not on the pose
-  TileGrid tiles;        // see choose_tiles
+  Frustum frustum;       // in camera coordinates
+  TileGrid tiles;
   void* color = nullptr;
   int64_t view_stride = 0;
   CameraPlanes planes;
 };
 
-/// Bounding sphere of a piece, for culling without reading the piece.
+/// Bounding sphere of a piece.
 struct alignas(16) Ball {
   Vec3 center_m;
   float radius_m = 0;
 };
 
-/// Grid of all pieces of one kind (strips or walls) of a map. A piece is only in the cell of its sphere's centre.
-/// Therefore queries visit each piece once, and the pieces of neighbouring cells of one grid row are contiguous.
+/// Grid of a map's strips or walls, by the centres of their spheres. Pieces of neighbouring cells of a row are
+/// contiguous.
 struct PieceGrid {
   GridView cells;
   Span<const Ball> balls;  // in the order of cells.items
   float largest_radius_m = 0;
 };
 
-/// A map's static geometry in device memory. The renderer's table has one such entry per handle.
+/// A map's static geometry in device memory: an entry of GeometryTable.
 struct DeviceGeometry {
   StaticGeometryView pieces;  // without its grids
   PieceGrid strips, walls;
@@ -76,8 +74,7 @@ inline DeviceGeometry empty_entry() {
   return entry;
 }
 
-/// Kind of a fault of a view or a query. Kernels write a fault, and the host throws it at the next call. A fault fits
-/// into one word, so that it is read and written atomically.
+/// Kind of a fault. Kernels write a fault as one atomic word, and the host throws it at the next call.
 enum class FaultKind : uint32_t {
   none,
   bad_world,
@@ -91,7 +88,7 @@ enum class FaultKind : uint32_t {
 };
 struct Fault {
   FaultKind kind = FaultKind::none;
-  int32_t index = 0;  // index of the view or the query, or the number of views
+  int32_t index = 0;  // index of the view or the query, or number of views
 };
 using FaultWord = unsigned long long;
 constexpr FaultWord kNoFault = 0;
@@ -102,29 +99,27 @@ PICTURA_HD constexpr Fault fault_of(FaultWord word) {
   return {static_cast<FaultKind>(word >> 32), static_cast<int32_t>(static_cast<uint32_t>(word))};
 }
 
-/// Face count of an image that is not in the pool. It is so low that increments by other warps leave it negative.
+/// Face count of an image outside the pool. Increments by other warps leave it negative.
 constexpr int32_t kNotPrepared = -(1 << 30);
 
-/// An image that is ready to be drawn: its faces in the pool, and the map and agents that stands_on() reads. The struct
-/// is copied as words, so it has no padding.
+/// An image ready to be drawn. It is copied as words, so it has no padding.
 struct PreparedImage {
   const DeviceGeometry* geometry = nullptr;
   const AgentBox* agents = nullptr;        // agents of its world
   int32_t face_begin = 0, face_count = 0;  // face_count may be kNotPrepared
-  int32_t has_overflowed = 0;              // 1: the image exceeded a block's memory
-  int32_t filler = 0;                      // pads to whole words
+  int32_t has_overflowed = 0;              // 1: exceeds a block's memory
+  int32_t filler = 0;
 };
 static_assert(sizeof(PreparedImage) == 2 * sizeof(void*) + 4 * sizeof(int32_t));
 
-/// A face of four corners and its primitive.
 struct alignas(16) Quad {
   CameraQuad in_camera;
   PrimitiveRef primitive;
   float floor_px;  // see CameraFace
 };
 
-/// Inputs and outputs of the face set-up of one image. Each entry has space for a face and, at the matching index, for
-/// four edges. Edges of clipped faces go to a range that images may share.
+/// Inputs and outputs of an image's face set-up. Each entry has space for a face and, at the matching index, four
+/// edges. Images may share the range of clipped edges.
 struct alignas(16) FaceSetupContext {
   ImageSetting setting;
   const Strip* strips = nullptr;
@@ -134,20 +129,19 @@ struct alignas(16) FaceSetupContext {
   const LightState* lights = nullptr;
   ScreenFace* faces = nullptr;
   PolygonEdge* edges = nullptr;
-  int32_t* num_faces = nullptr;    // number of faces written so far
-  int32_t* num_clipped = nullptr;  // number of edges of clipped faces; may exceed their range
-  int32_t edge_begin = 0;          // first edge of the faces, which have four edges each
+  int32_t* num_faces = nullptr;    // faces written so far
+  int32_t* num_clipped = nullptr;  // edges of clipped faces; may exceed their range
+  int32_t edge_begin = 0;          // first edge of unclipped faces
   int32_t clipped_begin = 0, clipped_end = 0;
 };
 
-/// Maximum number of entries of an image that is drawn from the pool.
+/// Maximum entries of an image that is drawn from the pool.
 constexpr int kMaxEntries = 1536;
 
-/// Batch of entries of an image (objects that may be visible, see cull.cuh). A warp sets up the faces of a batch, one
-/// per lane.
+/// Batch of an image's entries. A warp sets up one entry per lane.
 struct FaceBatch {
   static constexpr int kEntries = 32;
-  /// Returns the number of batches for this number of entries; the last batch may be partly filled.
+  /// The last batch may be partly filled.
   PICTURA_HD static constexpr int32_t count_of(int32_t entries) { return (entries + kEntries - 1) / kEntries; }
   int32_t image, first_entry;
 };
@@ -157,13 +151,13 @@ struct ClippedPrimitive {
   int32_t image;
 };
 
-/// Lists that each stage of face set-up passes to the next. Both have capacity for every visible entry.
+/// Lists that each stage of face set-up passes to the next, with capacity for every visible entry.
 struct SetupLists {
   uint32_t* entries = nullptr;          // [max_entries] per image, padded to whole batches
   ClippedPrimitive* clipped = nullptr;  // filled from both ends: faces at the front, lights at the back
   int32_t max_entries = 0, max_clipped = 0;
 };
-/// Lengths of SetupLists::clipped from its front and from its back.
+/// Lengths of SetupLists::clipped from its front and back.
 struct SetupCounts {
   int32_t clipped = 0, lights = 0;
 };
@@ -179,12 +173,12 @@ struct FacePool {
   int32_t max_faces = 0, max_edges = 0;  // max_edges: four per face, the rest for clipped faces
 };
 
-/// Returns how many blocks can set up one image each in the pool's memory: at least one, at most max_blocks.
+/// Returns how many blocks can set up one image each in the pool: 1 to max_blocks.
 PICTURA_HD inline int setup_blocks(const FacePool& pool, int max_blocks) {
   return min_of(pool.max_faces / kMaxEntries, max_blocks);
 }
 
-/// Memory of the blocks of the last launch, and the capacity of each block.
+/// Memory of the overflow launch's blocks, and the capacity of each block.
 struct Scratch {
   ScreenFace* faces = nullptr;     // [blocks][max_faces]
   PolygonEdge* edges = nullptr;    // [blocks][max_edges]
@@ -192,33 +186,33 @@ struct Scratch {
   int32_t blocks = 0, max_faces = 0, max_edges = 0;
 };
 
-/// Counters shared by the launches of a batch; all 0 before the first launch, and reset by the last block.
+/// Counters of a batch's launches: 0 before the first launch, reset by the last block.
 struct DrawCounters {
   int32_t next_culled = 0, next_clipped = 0, next_drawn = 0;  // next_drawn counts tiles
   SetupCounts listed;
   int32_t faces = 0, batches = 0, clipped_edges = 0;  // allocated from the pool
-  int32_t cost_buckets[kNumCostBuckets] = {};         // number of images drawn from the pool, by bucket
-  int32_t deferred = 0;                               // number of images that did not fit into the pool
-  int32_t overflow = 0;                               // number of images left to the last launch
-  int32_t finished_blocks = 0;                        // number of finished blocks of the last launch
+  int32_t cost_buckets[kNumCostBuckets] = {};         // images drawn from the pool, by bucket
+  int32_t deferred = 0;
+  int32_t overflow = 0;
+  int32_t finished_blocks = 0;  // blocks of the overflow launch
 };
 
 struct DrawTask {
   SceneBatch scene;                     // in device memory, as are the targets of all pointers below
   const View* views = nullptr;          // [max_views]
-  const int32_t* view_count = nullptr;  // number of views to draw; null: all
+  const int32_t* view_count = nullptr;  // views to draw; null: all
   int32_t max_views = 0;
   int32_t first_view = 0;  // this launch draws views [first_view, first_view + num_views)
   int32_t num_views = 0, num_cameras = 0;
-  int32_t max_tiles = 0;  // maximum number of tiles of an image
+  int32_t max_tiles = 0;  // tiles of an image, maximum over cameras
   const DeviceGeometry* geometries = nullptr;
   int32_t num_geometries = 0;
   float line_floor_px = 0;
   bool debug_palette = false;
   CameraRandomization randomization;
   PixelFormat format = PixelFormat::u8;
-  ChannelOrder order = ChannelOrder::planar;  // or patches
-  int32_t patch_px = kDefaultPatch_px;        // side of the patches
+  ChannelOrder order = ChannelOrder::planar;
+  int32_t patch_px = kDefaultPatch_px;
   bool wants_planes = false;
   FaultWord* fault = nullptr;
   FacePool pool;
@@ -229,10 +223,9 @@ struct DrawTask {
   CameraSlot cameras[kMaxCameras];
 };
 
-/// Chooses the tile size from the number of drawing blocks.
+/// blocks: number of drawing blocks.
 PICTURA_HD inline void choose_tiles(DrawTask* task, int blocks) {
-  // Wide tiles keep all threads busy. If there are few tiles per block, narrow tiles are better, because blocks that
-  // end early are idle.
+  // Wide tiles keep all threads busy. With few tiles per block, narrow tiles balance the blocks better.
   constexpr int kTilesOfBlock = 12;
   const int images = task->num_views * task->num_cameras;
   constexpr int kWidths_px[] = {kTileWidth_px, kNarrowTile_px};

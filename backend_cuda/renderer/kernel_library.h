@@ -1,4 +1,4 @@
-// The renderer's kernels on a device: built for its rig by NVRTC, or built ahead of time.
+// The renderer's kernels on a device, built at run time or ahead of time.
 #pragma once
 
 #include <memory>
@@ -10,15 +10,14 @@
 
 namespace pictura::cuda {
 
-/// Owner of the loaded code of kernels.
 class KernelLibrary {
  public:
-  /// Builds the kernels for a configuration's rig and CUDA device, which must be the current device. Without NVRTC,
-  /// uses the kernels that are compiled into this program, and throws Error if they do not run on the device.
+  /// Builds the kernels for the configuration's rig and device, which must be current. Without NVRTC, uses the
+  /// program's own kernels. Throws Error if they do not run on the device.
   explicit KernelLibrary(const RendererConfig& config);
 
   const KernelSet& kernels() const { return kernels_; }
-  /// Origin of the kernels, for messages.
+  /// For messages.
   const std::string& origin() const { return origin_; }
 
  private:

@@ -1,5 +1,4 @@
-// Sources of kernels that are compiled at run time. They are part of the library, so that an installed copy needs no
-// source tree. cmake/EmbedSources.cmake generates their definitions.
+// Embedded sources of the kernels that are compiled at run time. cmake/EmbedSources.cmake generates their definitions.
 #pragma once
 
 #include <array>
@@ -18,7 +17,6 @@ struct KernelProgram {
   Span<const KernelSource> headers;  // all headers that it includes, directly or indirectly
 };
 
-/// Returns the program of the renderer's kernels.
 KernelProgram renderer_program();
 
 /// Kernels in the order of their launches.

@@ -1,5 +1,4 @@
-// The drawing kernels. backend_cuda/renderer/launch.cu compiles them ahead of time; at run time they are compiled from
-// a copy of this file and of all files that it includes.
+// The drawing kernels, which launch.cu compiles ahead of time, and NVRTC at run time.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/face_setup.cuh"
@@ -12,7 +11,7 @@
 
 namespace pictura::cuda {
 
-// Draws a part of the image state->current. Returns false if it does not fit into the block's memory.
+// Returns false if the part does not fit into the block's memory.
 template <typename Memory>
 __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int32_t view, int32_t camera,
                                 const Part& part) {
@@ -21,7 +20,7 @@ __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int3
   const int num_faces = memory.state->current.face_count;
   const int64_t plane = static_cast<int64_t>(width) * height;
   if (kRandomizesCameras && threadIdx.x == 0) {
-    // Images of invalid views, which have no geometry, are black.
+    // Images of invalid views are black.
     const bool is_valid = memory.state->current.geometry != nullptr;
     memory.state->effect = is_valid ? image_effect(task.randomization, task.views[view].key, camera) : ImageEffect{};
   }
@@ -32,7 +31,7 @@ __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int3
   return true;
 }
 
-// Culls with one warp per image: lists the primitives that may be visible in the image, and allocates its faces.
+// Lists the primitives that may be visible in each image, and allocates its faces.
 extern "C" __global__ void __launch_bounds__(kSetupThreads, kCullBlocksPerProcessor)
     pictura_cull(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
@@ -76,15 +75,15 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kCullBlocksPerProces
   }
 }
 
-// Sets up the faces that need no clipping, one warp per batch of entries, and lists the faces that need it.
+// Sets up the faces that need no clipping, and lists the other faces.
 extern "C" __global__ void __launch_bounds__(kSetupThreads, kFaceSetupBlocksPerProcessor)
     pictura_setup_faces(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
   FaceSetupState* state = face_setup_state();
   DrawCounters* counters = task.counters;
   const int32_t num_batches = counters->batches, num_blocks = static_cast<int32_t>(gridDim.x);
-  // Batches take about equal time, so each block takes every num_blocks-th batch. While the warp sets up one batch, it
-  // loads the entries and the context of the next batch, and the descriptor of the batch after the next.
+  // Batches take about equal time, so each block takes every num_blocks-th batch. The warp prefetches the next batch,
+  // and the descriptor of the batch after it.
   auto i = static_cast<int32_t>(blockIdx.x);
   auto batch_at = [&](int32_t at) { return at < num_batches ? task.pool.batches[at] : FaceBatch{}; };
   FaceBatch next = batch_at(i), after = batch_at(i + num_blocks);
@@ -118,8 +117,7 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kClipBlocksPerProces
   ClipShared* storage = &geometry_shared()->clip;
   DrawCounters* counters = task.counters;
   const SetupCounts listed = counters->listed;
-  // Faces are spread over all warps, even if a warp then takes few faces, because each face is a long chain of
-  // dependent instructions.
+  // Faces are spread over all warps, because each face is a long chain of dependent instructions.
   const auto num_blocks = static_cast<int32_t>(gridDim.x);
   const int batch = clamp((listed.clipped + num_blocks - 1) / num_blocks, 1, kWarpSize);
   PICTURA_NO_UNROLL
@@ -134,7 +132,7 @@ extern "C" __global__ void __launch_bounds__(kSetupThreads, kClipBlocksPerProces
   }
 }
 
-// Returns a tile of a camera's images. Tiles below the last row are empty.
+// Tiles below the last row are empty.
 __device__ inline Part tile_of(const CameraSlot& slot, int32_t tile) {
   const TileGrid& tiles = slot.tiles;
   const int height = height_px(slot.camera);
@@ -147,9 +145,8 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   wait_for_earlier_launch();
   BlockState* state = block_state();
   int32_t* const counter = &task.counters->next_drawn;
-  // While the block draws a tile, one thread of the last warp, which has the fewest faces to process, fetches the
-  // number of the tile after next. It prefetches the next tile and its image into shared memory, because the thread has
-  // no registers left.
+  // While the block draws a tile, one thread of the last warp, which has the least work, prefetches the next tile and
+  // its image.
   DrawOrder order(task);
   int32_t next_image = -1, after = 0;
   auto take_next = [&] {
@@ -194,8 +191,7 @@ extern "C" __global__ void __launch_bounds__(kDrawThreads, kDrawBlocksPerProcess
   }
 }
 
-// Sets up the faces of an image and draws it, in one block. Returns false if the image does not fit into memory, or if
-// its view is invalid. Collective over all threads of the block.
+// Returns false if the image does not fit into memory, or if its view is invalid. Collective over the block.
 template <typename Memory>
 __device__ bool prepare_and_draw(const DrawTask& task, int32_t image, const SetupTarget& target) {
   const int32_t view = view_of(task, image), camera = camera_of(task, image);
@@ -206,13 +202,12 @@ __device__ bool prepare_and_draw(const DrawTask& task, int32_t image, const Setu
              [&](const auto& memory, const Part& part) { return draw_image_part(memory, task, view, camera, part); });
 }
 
-// Shared memory of a block of pictura_draw_deferred, in bytes.
 __host__ __device__ inline size_t deferred_bytes() {
   const size_t to_set_up = setup_bytes(kDrawThreads), to_draw = draw_bytes();
   return to_set_up > to_draw ? to_set_up : to_draw;
 }
 
-// Draws the images that did not fit into the pool, one image per block at a time, in the pool's memory.
+// Draws the deferred images in the pool's memory, one image per block at a time.
 extern "C" __global__ void __launch_bounds__(kDrawThreads, kDeferredBlocksPerProcessor)
     pictura_draw_deferred(const __grid_constant__ DrawTask task) {
   wait_for_earlier_launch();
@@ -270,8 +265,7 @@ extern "C" __global__ void __launch_bounds__(kLargeThreads)
     if (!is_view) fault(q, FaultKind::bad_query);
     PICTURA_NO_UNROLL
     for (int32_t camera = 0; is_view && view < num_drawn && camera < num_cameras(task.draw); ++camera) {
-      // Occlusion culling is off, because occluded faces count when the agent is drawn alone. set_view reports faults
-      // of the view.
+      // Occlusion culling is off, because occluded faces count when the agent is drawn alone.
       if (!prepare_image(task.draw, view, camera, setup_target_of(state->scratch), false)) {
         if (state->usable != 0) fault(view, FaultKind::capacity_exceeded);
         continue;

@@ -1,19 +1,16 @@
-// Conversion of fragments to pixels: resolves the occlusion of each pair of fragments of a pixel, then composites each
-// pixel.
+// From fragments to pixels: resolves the occlusion among a pixel's fragments, then composites the pixel.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/fragments.cuh"
 
 namespace pictura::cuda {
 
-// Whether a solid stands on a strip (stands_on) in the current image.
 __device__ __noinline__ inline bool stands(uint32_t solid, uint32_t strip) {
   const PreparedImage& image = block_state()->current;
   const StaticGeometryView& pieces = image.geometry->pieces;
   return stands_on(extent_of(solid, pieces, image.agents), extent_of(strip, pieces, image.agents));
 }
 
-// Removes samples from a fragment's visible samples.
 template <typename Memory>
 __device__ void clear_visible_samples(const Memory& memory, uint32_t fragment, uint64_t samples) {
   const auto low = static_cast<uint32_t>(samples), high = static_cast<uint32_t>(samples >> 32);
@@ -21,7 +18,7 @@ __device__ void clear_visible_samples(const Memory& memory, uint32_t fragment, u
   if (high != 0) atomicAnd(&memory.visible_high[fragment], ~high);
 }
 
-// Resolves the occlusion of a pair of fragments; pair.b is kNone for the pixel's full face.
+// pair.b: kNone for the pixel's full face.
 template <typename Memory>
 __device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
   if (!pair.is_valid) return;
@@ -38,16 +35,15 @@ __device__ __noinline__ void resolve_pairs(WarpQueue::Pair pair, Part part) {
   if (!with_full) clear_visible_samples(memory, pair.b, occluded.of_b);
 }
 
-// Resolves the occlusion of all pairs among a pixel's fragments and its full face, except for pairs that can no longer
-// occlude each other. A lane takes a fragment and walks the rest of the list after it, one step at a time. At the end
-// of the list, the lane takes another fragment. Fragments that were made last come first, because their lists are
-// longest. Overlapping pairs are queued until every lane of the warp has one.
+// Resolves the occlusion among each pixel's fragments and its full face. A lane takes a fragment and walks the rest of
+// its list. Later fragments come first, because their lists are longest. Overlapping pairs are queued until every lane
+// has one.
 template <typename Memory>
 __device__ void resolve_occlusion(const Memory& memory, const Part& part, int count) {
   WarpQueue pairs(&memory.state->warps[warp_index()].queue);
-  int begin = 0, used = kWarpSize;  // first of the warp's current 32 fragments, and how many of these are taken
+  int begin = 0, used = kWarpSize;  // first of the warp's 32 fragments, and how many are taken
   int fragment = 0;
-  uint32_t other = Memory::kNone;  // the next fragment of the list
+  uint32_t other = Memory::kNone;  // next fragment of the list
   bool is_before_full = false;     // the pair with the full face comes first
   uint64_t samples = 0;
   PICTURA_NO_UNROLL
@@ -83,8 +79,7 @@ __device__ void resolve_occlusion(const Memory& memory, const Part& part, int co
   if (!pairs.is_empty()) resolve_pairs<Memory>(pairs.take(), part);
 }
 
-// Divides the remainders of pixels that several fragments cover fully. The first such fragment of the pixel's list
-// performs the division.
+// Calls divide_remainder() for each pixel that several fragments cover fully, in the thread of the first.
 template <typename Memory>
 __device__ __noinline__ void divide_remainders(int count) {
   const Memory memory = Memory::current();
@@ -107,14 +102,13 @@ __device__ __noinline__ void divide_remainders(int count) {
   }
 }
 
-/// Visitor that ignores fragments' weights.
 struct NoVisit {
   static constexpr bool kWanted = false;
   __device__ void operator()(const ScreenFace&, float) const {}
 };
 
-// Computes the fragments' weights. A fragment that is alone in its pixel directly gives the pixel's colour. For other
-// fragments, the contribution and the kind of weight overwrite the samples and the pixel index.
+// Computes the fragments' weights. A fragment that is alone in its pixel gives the colour directly. Otherwise, its
+// contribution and kind of weight overwrite its samples and pixel index.
 template <typename Memory, typename Visit, typename Write>
 __device__ void compute_weights(const Memory& memory, int count, const Visit& visit, const Write& write) {
   PICTURA_NO_UNROLL
@@ -133,7 +127,7 @@ __device__ void compute_weights(const Memory& memory, int count, const Visit& vi
   }
 }
 
-// Composites the pixels of a part that have more than one fragment, and calls visit(face, weight) for each fragment.
+// Composites the pixels in memory.composited, and calls visit(face, weight) for each of their faces.
 template <typename Memory, typename Visit, typename Write>
 __device__ void composite_pixels(const Memory& memory, const Visit& visit, const Write& write) {
   const int num_composited = memory.state->num_composited;
@@ -164,7 +158,7 @@ __device__ void composite_pixels(const Memory& memory, const Visit& visit, const
   }
 }
 
-// Writes the pixels of a part, a few neighbours per thread, and clears their words.
+// Writes the pixels of a part and clears their words.
 template <typename Memory, typename Visit, typename Write>
 __device__ void write_pixels(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
   using Word = typename Memory::Word;
@@ -188,7 +182,6 @@ __device__ void write_pixels(const Memory& memory, const Part& part, const Visit
   }
 }
 
-// Clears the counters of a part.
 template <typename Memory>
 __device__ void reset_counts(const Memory& memory) {
   BlockState* state = memory.state;
@@ -196,8 +189,7 @@ __device__ void reset_counts(const Memory& memory) {
   state->num_rows = state->num_candidates = state->num_fragments = state->num_added = state->divides = 0;
   state->num_composited = state->next_fragments = 0;
 }
-// Clears the pixels and counters, before a block's first part and after a part that did not fit. Collective over all
-// threads of the block.
+// Collective over the block.
 template <typename Memory>
 __device__ void reset_part(const Memory& memory) {
   sync_block();
@@ -207,8 +199,7 @@ __device__ void reset_part(const Memory& memory) {
   sync_block();
 }
 
-// Makes the fragments of the listed rows and composites their pixels. Returns false if they do not fit into memory.
-// Collective over all threads of the block.
+// Returns false if the fragments do not fit into memory. Collective over the block.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_rows(const Memory& memory, const Part& part, const Visit& visit, const Write& write) {
   BlockState* state = memory.state;
@@ -237,8 +228,8 @@ __device__ bool draw_rows(const Memory& memory, const Part& part, const Visit& v
   return true;
 }
 
-// Draws the faces into one part and clears the memory for the next part. Returns false, without clearing, if the part
-// does not fit into memory. Collective over all threads of the block; the caller synchronizes before the next part.
+// Draws the faces into a part and clears the memory. Returns false, without clearing, if the part does not fit.
+// Collective over the block; the caller synchronizes before the next part.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part, const Visit& visit,
                           const Write& write) {
@@ -253,9 +244,8 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
   return true;
 }
 
-// Plans the next part of a tile, after a part that was drawn or did not fit. Parts first become narrower, then lower,
-// because distant primitives are concentrated along the horizon. Returns false if a single pixel does not fit.
-// Collective over all threads of the block.
+// Plans the next part of a tile. Parts that do not fit become narrower, then lower, because distant primitives lie
+// along the horizon. Returns false if a single pixel does not fit. Collective over the block.
 template <typename Memory>
 __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn) {
   constexpr int kNarrowPart_px = 2 * kPixelsPerWrite;
@@ -268,8 +258,7 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
     if (columns == whole.num_columns() && rows == whole.num_rows()) plan = {whole.x_begin, columns, columns, rows};
     int x = part.x_begin, y = part.y_begin;
     if (is_drawn) {
-      // The next part is in the same row of parts, else in the next row of the band (a range of columns), else in the
-      // next band.
+      // The next part is in the same row of parts, else in the band's next row, else in the next band.
       const int band_end = min_of(plan.band_begin + plan.band_px, whole.x_end);
       x = part.x_end;
       if (x == band_end) {
@@ -288,8 +277,7 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
     } else if (rows > 1) {
       plan.rows = half_of(rows);
     } else {
-      // A part begins at a multiple of its width, so that the pixels that a thread writes lie in one patch
-      // (common/patches.h).
+      // A part begins at a multiple of its width, so that a thread's pixels lie in one patch.
       plan.wide_px = columns > kPixelsPerWrite ? kPixelsPerWrite : columns > 2 ? 2 : 1;
     }
     plan.part = {x, min_of(x + plan.wide_px, min_of(plan.band_begin + plan.band_px, whole.x_end)), y,
@@ -303,10 +291,9 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
   return is_drawn || part.num_columns() > 1 || part.num_rows() > 1;
 }
 
-// Draws the faces into a part of an image, in smaller parts if it does not fit. Calls visit(face, weight) for each
-// fragment, write.store_color(memory, fragment, colour) for each pixel with fragments, and write.pixels(memory, x, y,
-// count, words) for neighbouring pixels. Returns false if a single pixel does not fit. Collective over all threads of
-// the block; the caller synchronizes before the next call.
+// Draws the faces into a part of an image, in smaller parts if it does not fit. `visit` gets the weights of faces, and
+// `write` the pixels (see NoVisit, ImageWriter). Returns false if a single pixel does not fit. Collective over the
+// block; the caller synchronizes before the next call.
 template <typename Memory, typename Visit, typename Write>
 __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whole, const Visit& visit,
                            const Write& write) {
@@ -320,8 +307,7 @@ __device__ bool draw_faces(const Memory& memory, int num_faces, const Part& whol
   }
 }
 
-// Calls draw(memory, tile) for the tiles of an image in sequence, until a call returns false. Tiles are as high as the
-// memory allows.
+// Calls draw(memory, tile) for an image's tiles until a call returns false. Tiles are as high as the memory allows.
 template <typename Memory, typename Draw>
 __device__ bool for_each_tile(const Memory& memory, int width_px, int y_begin, int y_end, const Draw& draw) {
   const int max_rows = memory.max_pixels / kTileWidth_px;

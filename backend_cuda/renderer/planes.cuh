@@ -5,7 +5,7 @@
 
 namespace pictura::cuda {
 
-// Writes the optional planes of a part from the faces that touch it. Collective over all threads of the block.
+// Collective over the block.
 template <typename Memory>
 __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int64_t first_pixel, int num_faces,
                                          Part part) {
@@ -14,7 +14,7 @@ __device__ __noinline__ void draw_planes(CameraPlanes planes, int width_px, int6
   sync_block();
   list_rows(memory, num_faces, part);
   sync_block();
-  // Builds a linked list of the faces of each row: heads in memory.pixels, links in memory.candidates; 0 ends a list.
+  // Linked list of the faces of each row: heads in memory.pixels, links in memory.candidates; 0 ends a list.
   const int num_rows = memory.state->num_rows;
   const bool fits = num_rows <= memory.max_rows;
   PICTURA_NO_UNROLL

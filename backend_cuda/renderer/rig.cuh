@@ -1,6 +1,5 @@
-// The rig's sizes as compile-time constants. Kernels built at run time are built for one rig, and get the macros below
-// from KernelTarget (kernel_build.h); 0 means that the size is read from the task. Separate kernels exist for
-// randomized cameras, so that the other kernels have no instructions for them.
+// The rig's sizes as compile-time constants. Kernels built at run time get these macros from KernelTarget. 0 means that
+// the size is read from the task.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/kernel_arguments.h"

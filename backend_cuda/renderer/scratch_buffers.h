@@ -1,23 +1,20 @@
-// The renderer's scratch memory (all except images, scenes and maps): sizes and owners. Buffer is DeviceBuffer, or
-// std::vector if kernels are emulated.
+// Sizes and owners of the renderer's scratch memory. Buffer is DeviceBuffer, or std::vector if kernels are emulated.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/kernel_arguments.h"
 
 namespace pictura::cuda {
 
-/// Capacity of the pool per image, in faces and edges: the average need in CARLA's towns. Images that do not fit are
-/// drawn when the pool is free again. Four edges belong to each face. The other edges are for clipped faces; about a
-/// third of these edges is used.
+/// Capacity of the pool per image: the average need in CARLA's towns. Each face has four edges; the other edges are for
+/// clipped faces.
 constexpr std::size_t kPoolFaces = 200, kPoolEdges = 928;
-/// Additional capacity in images, for batches of few images that may all have many faces.
+/// Additional capacity, in images, for small batches with many faces per image.
 constexpr std::size_t kMinPoolImages = 4 * kMaxEntries / kPoolFaces + 1;
 static_assert(kMinPoolImages * kPoolFaces >= kMaxEntries, "a deferred image fits into the pool");
 
-/// Capacities of a pool.
 struct PoolSizes {
   std::size_t images, faces, edges;
-  /// Returns enough batches for all faces; the last batch of each image may be partly filled.
+  /// Enough for all faces; the last batch of each image may be partly filled.
   constexpr std::size_t batches() const { return faces / FaceBatch::kEntries + images; }
   constexpr std::size_t entries() const { return images * kMaxEntries; }
   constexpr std::size_t listed_images() const { return (2 + kNumCostBuckets) * images; }
@@ -31,13 +28,12 @@ constexpr PoolSizes pool_sizes(std::size_t images) {
   const std::size_t num_allocations = images + kMinPoolImages;
   return {images, num_allocations * kPoolFaces, num_allocations * kPoolEdges};
 }
-/// Bytes of a pool per image, and bytes of a pool without images. For a pool of n images, n * kPoolImageBytes +
-/// kMinPoolBytes bytes are enough. The pool's real size is smaller by at most one FaceBatch.
+/// A pool of n images needs at most n * kPoolImageBytes + kMinPoolBytes bytes.
 constexpr std::size_t kPoolImageBytes =
     (pool_sizes(FaceBatch::kEntries).bytes() - pool_sizes(0).bytes()) / FaceBatch::kEntries;
 constexpr std::size_t kMinPoolBytes = pool_sizes(0).bytes() + sizeof(FaceBatch);
 
-/// Owner of the pool: the faces of many images and the intermediate results of their set-up.
+/// Owner of the pool's memory (see FacePool).
 template <template <typename> class Buffer>
 class PoolBuffers {
  public:
@@ -77,12 +73,11 @@ class PoolBuffers {
   Buffer<int32_t> lists_;
 };
 
-/// Owner of the memory of the blocks of the last launch.
+/// Owner of the memory of the overflow launch's blocks.
 template <template <typename> class Buffer>
 class OverflowBuffers {
  public:
   OverflowBuffers() = default;
-  /// Allocates for sizes.blocks blocks.
   OverflowBuffers(const Scratch& sizes, std::size_t bytes_per_block)
       : scratch_(sizes),
         faces_(count(sizes.blocks, sizes.max_faces)),

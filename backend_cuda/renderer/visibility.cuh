@@ -1,4 +1,4 @@
-// Visible weight of an agent in an image, among all other objects and when drawn alone (see VisibilitySum).
+// Visible weight of an agent in an image (see VisibilitySum).
 #pragma once
 
 #include "pictura/backend_cuda/renderer/face_setup.cuh"
@@ -7,7 +7,6 @@
 
 namespace pictura::cuda {
 
-/// Visitor that sums the weights of an agent's fragments.
 struct AccumulateVisibility {
   static constexpr bool kWanted = true;
   uint32_t object_id;
@@ -21,7 +20,7 @@ struct RowRange {
   int y_begin, y_end;
 };
 
-// Returns the rows of the prepared image that a primitive may touch. Every thread computes them by itself.
+// Returns the rows of the prepared image that an object may touch.
 __device__ inline RowRange rows_of(const BlockState& state, uint32_t object_id) {
   RowRange rows{state.context.setting.camera.height_px, 0};
   PICTURA_NO_UNROLL
@@ -34,9 +33,8 @@ __device__ inline RowRange rows_of(const BlockState& state, uint32_t object_id) 
   return rows;
 }
 
-// Adds the weights of a primitive's fragments in the prepared image to the thread's sums: first with all primitives
-// drawn, then with only this primitive drawn. Returns false if the image does not fit into the block's memory.
-// Collective over all threads of the block.
+// Adds an object's weights in the prepared image to the thread's sums: among all objects, then alone. Returns false if
+// the image does not fit into memory. Collective over the block.
 __device__ inline bool accumulate_visibility(BlockState* state, uint32_t object_id, VisibilitySum* sum_inout) {
   const RowRange rows = rows_of(*state, object_id);
   const int num_faces = state->num_faces;

@@ -1,5 +1,5 @@
-// The simulator's device memory. Every array has the length of the simulator's capacity, so that other worlds within
-// this capacity need no allocation. Copies are asynchronous on a stream.
+// The simulator's device memory. Arrays have the length of the simulator's capacity, so that other worlds need no
+// allocation. Copies are asynchronous on a stream.
 #pragma once
 
 #include <algorithm>
@@ -13,20 +13,20 @@
 
 namespace pictura {
 
-/// Copies from host memory, which the caller may reuse after the call.
+/// The caller may reuse `host` after the call.
 template <typename T>
 void put(const std::vector<T>& host, const DeviceBuffer<T>& device, cudaStream_t stream) {
   if (host.empty()) return;
   PICTURA_CUDA(cudaMemcpyAsync(device.data(), host.data(), host.size() * sizeof(T), cudaMemcpyHostToDevice, stream));
 }
-/// Copies as many elements to the host as fit. They are valid after a wait for the stream.
+/// Copies as many elements as fit. They are valid after a wait for the stream.
 template <typename T>
 void get(const DeviceBuffer<T>& device, std::vector<T>* host_out, cudaStream_t stream) {
   if (host_out->empty()) return;
   PICTURA_CUDA(
       cudaMemcpyAsync(host_out->data(), device.data(), host_out->size() * sizeof(T), cudaMemcpyDeviceToHost, stream));
 }
-/// Copies within the device, as many elements as fit into both buffers.
+/// Copies as many elements as fit into both buffers.
 template <typename T>
 void copy(const DeviceBuffer<T>& from, const DeviceBuffer<T>& to, cudaStream_t stream) {
   const size_t count = std::min(from.size(), to.size());
@@ -34,7 +34,7 @@ void copy(const DeviceBuffer<T>& from, const DeviceBuffer<T>& to, cudaStream_t s
   PICTURA_CUDA(cudaMemcpyAsync(to.data(), from.data(), count * sizeof(T), cudaMemcpyDeviceToDevice, stream));
 }
 
-/// Fields of the agents' state, with the names of AgentState.
+/// Fields of AgentState.
 struct DeviceAgents {
 #define X(name, type, per_agent, first, comment) DeviceBuffer<type> name;
   PICTURA_AGENT_FIELDS(X)
@@ -67,7 +67,7 @@ struct DeviceAgents {
   }
 };
 
-/// State of the simulator, with the names of SimulatorState.
+/// Arrays of SimulatorState.
 struct DeviceState {
   DeviceAgents agents;
   DeviceBuffer<AgentBox> boxes, boxes_before;
@@ -101,21 +101,20 @@ struct DeviceState {
     agents.get_to(&host_out->agents, stream);
     SimulatorState::visit_arrays(*this, *host_out, [stream](const auto& from, auto& to) { get(from, &to, stream); });
   }
-  /// Copies as many elements as fit into both. A snapshot has the size of its worlds; the simulator's own state has the
-  /// size of its capacity.
+  /// Copies as many elements as fit into both: a snapshot may be smaller than the simulator's state.
   void copy_to(const DeviceState& other, cudaStream_t stream) const {
     agents.copy_to(other.agents, stream);
     SimulatorState::visit_arrays(*this, other, [stream](const auto& from, const auto& to) { copy(from, to, stream); });
   }
 };
 
-/// The arrays of several maps, which the rules read, in one block of memory.
+/// Arrays of several maps.
 class DeviceMaps {
  public:
   DeviceMaps() = default;
   DeviceMaps(size_t num_maps, size_t num_bytes) : memory_(num_bytes), views_(num_maps) {}
 
-  /// Copies the maps that are not loaded yet. Unused maps stay while there is memory for all.
+  /// Loads missing maps. Unused maps stay while there is memory for all.
   void load(const CompiledMaps& maps, cudaStream_t stream) {
     size_t missing = 0, missing_bytes = 0;
     for (const auto& map : maps) {
@@ -131,7 +130,7 @@ class DeviceMaps {
       if (find(map) == maps_.size()) append(map, stream);
     }
   }
-  /// Returns the view, in device memory, of a map that has been loaded.
+  /// Returns a loaded map's view, in device memory.
   const MapView& view(const std::shared_ptr<const CompiledMap>& map) const { return views_.data()[find(map)]; }
 
  private:
@@ -210,7 +209,7 @@ struct DeviceResults {
     PICTURA_OBSERVATION_ARRAYS(X)
 #undef X
   }
-  /// Sets all rows to zero, because a later write to a set clears only the rows that the previous write filled.
+  /// Sets all rows to zero, because later writes clear only the rows that the previous write filled.
   void clear(cudaStream_t stream) const {
     const auto clear_one = [stream](const auto& buffer) {
       if (buffer.size() == 0) return;
@@ -251,7 +250,6 @@ struct DeviceScratch {
   DeviceBuffer<int32_t> chain_first, chain_next, crowd_begin, crowd_items;
   DeviceBuffer<uint8_t> began, prepares;
   DeviceBuffer<int32_t> rejected_slot, first_element, faulty_element;
-  // Initial state of the next episode.
   DeviceAgents next_agents;
   DeviceBuffer<AgentBox> next_boxes;
   DeviceBuffer<LightPlan> next_light_plans;
@@ -288,11 +286,11 @@ struct DeviceScratch {
         next_spawned(num_worlds) {}
 };
 
-/// A stream that runs in parallel to the caller's stream, and the events that order both.
+/// A stream parallel to the caller's stream, and events that order both.
 class SideStream {
  public:
   SideStream() {
-    // Higher priority, because the stream has little work and all other work waits for its end.
+    // Higher priority, because all other work waits for it.
     int lowest = 0, highest = 0;
     PICTURA_CUDA(cudaDeviceGetStreamPriorityRange(&lowest, &highest));
     cudaStream_t side = nullptr;

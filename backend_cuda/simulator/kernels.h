@@ -1,5 +1,4 @@
-// Kernels that the simulator's host side launches. All launches are asynchronous on a stream; callers check
-// cudaGetLastError().
+// Kernels that the simulator's host side launches, asynchronously on a stream. Callers check cudaGetLastError().
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -9,14 +8,13 @@
 
 namespace pictura::cuda {
 
-/// The caller's stream, and a second stream for work that may overlap. The events order both streams. A CUDA graph
-/// captures both.
+/// The caller's stream, a second stream for work that may overlap, and events that order both.
 struct StepStreams {
   cudaStream_t main = nullptr, side = nullptr;
   cudaEvent_t forked = nullptr, joined = nullptr;
 };
 
-/// Launches the phases of a reset, in the worlds of `mask` [worlds], or in all worlds if the mask is null.
+/// mask: [worlds]; null: all worlds.
 void launch_reset(const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed, const StepStreams& streams);
 void launch_edit(const PhaseArrays& arrays, const StateEdit& edit, const StepStreams& streams);
 void launch_queries(const PhaseArrays& arrays, const ObservationQueries& asked, const StepStreams& streams);
@@ -24,8 +22,7 @@ void launch_publish_restored(const PhaseArrays& arrays, const StepStreams& strea
 void launch_step(const PhaseArrays& arrays, const int32_t* actions, const StepStreams& streams);
 void launch_step(const PhaseArrays& arrays, const Command* commands, const StepStreams& streams);
 
-/// Launches a kernel that writes the commands of a rule of simulator/rules/control.h, for the slots of `mask` [slots],
-/// or for all slots if the mask is null.
+/// Writes the commands of a rule of simulator/rules/control.h. mask: [slots]; null: all slots.
 template <typename Rule>
 void launch_commands(const Rule& rule, int32_t num_slots, const uint8_t* mask, Command* commands_out,
                      cudaStream_t stream);

@@ -7,14 +7,14 @@
 
 namespace pictura::cuda {
 
-/// Writes observations of agents, one group of threads per observation.
+/// Writes observations, one group of threads per observation.
 class ObservationWriter {
  public:
-  /// Maximum number of floats that the rows of one set need in a group's memory.
+  /// Maximum number of floats of one set's rows.
   static constexpr int kStaging = max_of(max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls) * kLaneFeatures,
                                          max_of(kMaxPartners* kPartnerFeatures, kMaxControls* kControlFeatures));
 
-  /// Writes observe_set() of every set to this row of `out`.
+  /// Writes observe_set() of every set to a row of `out`.
   template <typename ThreadGroup, typename Observation>
   PICTURA_HD static void write_sets(const ThreadGroup& group, const WorldView& world, int agent,
                                     const Observation& observation, const ObservationView& out, int row, Hides hidden) {
@@ -34,7 +34,7 @@ class ObservationWriter {
     int count = 0;
     if (observes_set(world, agent, set, hidden)) {
       const EgoFrame frame = ego_frame(world.agents, slot);
-      const NearPlace place = near_place(world, slot);  // recomputed per set, because keeping it would spill registers
+      const NearPlace place = near_place(world, slot);  // recomputed, to save registers
       if (set == EntitySet::partners) {
         count = observation.observe_partners(world, agent, frame, rows, group);
       } else if (set == EntitySet::controls) {
@@ -50,7 +50,7 @@ class ObservationWriter {
     group.sync();
   }
 
-  /// Version of observe_pieces() in which each thread loads several pieces at a time, so that the loads overlap.
+  /// Version of observe_pieces() with overlapping loads.
   template <typename ThreadGroup>
   PICTURA_HD static int collect_pieces(const ThreadGroup& group, const PieceList& near, const EgoFrame& frame,
                                        int capacity, float* rows) {
@@ -79,7 +79,7 @@ class ObservationWriter {
   }
 };
 
-/// Phase that writes a slot's view and observation.
+/// Writes a slot's view and observation.
 struct WriteObservation {
   PhaseArrays arrays;
   static constexpr int kStaging = ObservationWriter::kStaging;

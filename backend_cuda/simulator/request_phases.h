@@ -1,4 +1,4 @@
-// Phases of the host's requests between steps: edits of the state, queries of observations, commands of controllers.
+// Phases of requests between steps: edits, queries of observations, commands of controllers.
 #pragma once
 
 #include "pictura/backend_cuda/simulator/reset_phases.h"
@@ -6,7 +6,7 @@
 
 namespace pictura::cuda {
 
-/// Phase that records, for each slot, the first element of an edit that names the slot.
+/// Records, for each slot, the first element of an edit that names it.
 struct MarkEdit {
   PhaseArrays arrays;
   StateEdit edit;
@@ -26,7 +26,7 @@ PICTURA_HD inline int64_t find_fault(const PhaseArrays& arrays, const Observatio
 }
 static_assert(kNoQueryFault == kNoEditFault);
 
-/// Phase that finds the first element with a fault in an edit or in queries.
+/// Finds the first faulty element.
 template <typename Request>
 struct CheckRequest {
   PhaseArrays arrays;
@@ -38,7 +38,7 @@ struct CheckRequest {
   }
 };
 
-/// Phase that writes the agents of an edit without faults into their worlds.
+/// Writes an edit without faults.
 struct ApplyEdit {
   CheckRequest<StateEdit> check;
   template <typename Atomics>
@@ -68,7 +68,7 @@ void launch_edit(const Launch& launch, const PhaseArrays& arrays, const StateEdi
   launch_write_observations(launch, arrays);
 }
 
-/// Phase that keeps the fault of the first faulty query until the host checks.
+/// Keeps the first query fault until the host checks.
 struct LatchQueryFault {
   CheckRequest<ObservationQueries> check;
   template <typename Atomics>
@@ -79,7 +79,7 @@ struct LatchQueryFault {
   }
 };
 
-/// Phase that runs answer_query(), unless any query has a fault.
+/// Runs answer_query(), unless any query has a fault.
 struct AnswerQueries {
   PhaseArrays arrays;
   ObservationQueries asked;
@@ -109,7 +109,7 @@ void launch_queries(const Launch& launch, const PhaseArrays& arrays, const Obser
   launch.template groups<kWarp>(count, AnswerQueries{arrays, asked});
 }
 
-/// Phase that writes the commands of a controller's rule to the slots of the mask.
+/// Writes commands to the mask's slots.
 template <typename Rule>
 struct WriteCommands {
   Rule rule;

@@ -1,5 +1,5 @@
-// Phases that begin episodes. The first episode of a seed begins immediately; each later episode is prepared while the
-// previous one continues.
+// Phases that begin episodes. The first episode of a seed begins immediately. Later episodes are prepared while the
+// previous episode continues.
 #pragma once
 
 #include "pictura/backend_cuda/simulator/observation_phases.h"
@@ -7,7 +7,7 @@
 
 namespace pictura::cuda {
 
-/// Number of boxes of a world that choose a place at the same time.
+/// Boxes of a world that choose a place at the same time.
 constexpr int kTurn = 128;
 
 /// Memory shared by a team's threads.
@@ -15,14 +15,13 @@ struct TeamMemory {
   int32_t lowest_changed;
 };
 
-/// Chooses a try (a candidate place) for each of `count` boxes, which are the world's boxes from first_box on. Adds the
-/// placed boxes to scratch.standing, the boxes that already have a place ("standing boxes"). The chosen try is the
-/// first that the map permits and that is clear of the standing boxes and of all boxes with lower numbers. So the
-/// result equals that of placing the boxes one after the other. In a turn, kTurn boxes choose at the same time. In each
-/// round of a turn, every box that is not yet fixed chooses again, given the last choices of the other boxes, until no
-/// choice changes. Then every choice follows from those of the boxes before it, and only the sequential result has this
-/// property. Every round fixes at least the lowest changed box. Choices of an earlier turn do not change.
-///   box_of_try(i, try), permits(group, i, try, box)
+/// Chooses a try (a candidate place) for each of the `count` boxes from first_box on, and adds the placed boxes to
+/// scratch.standing (the standing boxes). A box takes its first try that the map permits and that is clear of standing
+/// boxes and of boxes with lower numbers.
+/// kTurn boxes choose at the same time. In each round, every box that is not fixed chooses again, given the last
+/// choices of the others, until no choice changes. Every round fixes at least the lowest changed box. The result equals
+/// that of placing the boxes one after the other.
+/// Callbacks: box_of_try(i, try), permits(group, i, try, box).
 template <typename Team, typename BoxOfTry, typename Permits>
 PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const WorldScratch& scratch, int first_box,
                              int count, const BoxOfTry& box_of_try, const Permits& permits) {
@@ -34,7 +33,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
   int32_t* chosen_try = scratch.chosen_try + first_box;
   int32_t* next_try = scratch.next_try + first_box;
   int32_t& lowest_changed = team.memory().lowest_changed;
-  // At first, two tries of each box are evaluated together, or more if there are few boxes.
+  // At first, two tries of each box are evaluated together, or more for few boxes.
   const int first_tries = clamp(kTurn / max_of(count, 1), 2, kSpawnTries);
   team.for_each(count, [&](int i) {
     boxes[i].drawn = 0;
@@ -42,14 +41,14 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
     known_tries[i] = 0;
     chosen_try[i] = -1;
   });
-  // Returns whether the map permits a try and the try is clear of the boxes that stood before this turn.
+  // Returns whether a try is permitted and clear of the boxes that stood before this turn.
   const auto evaluate_try = [&](const auto& group, int i, int t) {
     const AgentBox box = box_of_try(i, t);
     const bool is_free = is_clear(world, box, scratch.standing, group) && permits(group, i, t, box);
     if (is_free && group.rank() == 0) try_boxes[i * kSpawnTries + t] = box;
     return is_free;
   };
-  // Evaluates a box's tries until one is clear of the standing boxes and of the choices of this turn.
+  // Evaluates a box's tries until one is clear of standing boxes and of this turn's choices.
   const auto choose = [&](const auto& group, int turn_begin, int i) {
     uint32_t free = free_tries[i];
     int known = known_tries[i], chosen = -1;
@@ -107,7 +106,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
   add_to_standing(max_of(turn_begin, 0), count);
 }
 
-/// Begins the episode of `world` and counts the agents that found a place.
+/// spawned_out: number of agents that found a place.
 template <typename Team>
 PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const WorldScratch& scratch,
                               int32_t* spawned_out) {
@@ -142,7 +141,7 @@ PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const Wo
   });
 }
 
-/// Phase that begins episode 0 of `seed` in the worlds of the mask [worlds], or in all worlds if the mask is null.
+/// Begins episode 0 of `seed` in the worlds of the mask [worlds]; null: all.
 struct BeginFirstEpisode {
   PhaseArrays arrays;
   const uint8_t* mask;
@@ -164,7 +163,6 @@ struct BeginFirstEpisode {
   }
 };
 
-/// Phase that writes the centres of a world's boxes.
 struct PlaceCenters {
   PhaseArrays arrays;
   template <typename ThreadGroup>
@@ -176,9 +174,8 @@ struct PlaceCenters {
   }
 };
 
-/// Phase that sorts the boxes of crowds (see is_crowd()) into cells by counting. If ends_step (the second sort of a
-/// step), it skips crowds whose world began no episode, unless the maps have lives. The order within a cell is
-/// arbitrary, and rules do not depend on it.
+/// Sorts the boxes of crowds (see is_crowd()) into cells by counting, in arbitrary order within a cell. ends_step: the
+/// second sort of a step, which skips worlds that began no episode, unless some map has roads that end.
 struct SortBoxes {
   PhaseArrays arrays;
   bool ends_step = false;
@@ -199,7 +196,7 @@ struct SortBoxes {
     };
     team.for_each(num_cells, [&](int cell) { begin[cell] = 0; });
     for_each_drawn([&](int, Vec2, int32_t* count) { team.add(count, 1); });
-    // Converts the number of items of each cell to the end of its range.
+    // Converts each cell's count to the end of its range.
     team.template for_each_by_groups<kWarp>(1, [&](const auto& group, int) {
       const int share = (num_cells + group.size() - 1) / group.size();
       const int first = min_of(group.rank() * share, num_cells), end = min_of(first + share, num_cells);
@@ -226,8 +223,7 @@ void launch_sort_boxes(const Launch& launch, const PhaseArrays& arrays, bool end
   if (arrays.has_crowds) launch.teams(arrays.num_worlds, SortBoxes{arrays, ends_step});
 }
 
-/// Phase that prepares a world's next episode as soon as the memory for it is free. This is possible long before the
-/// episode is needed, because its start does not depend on the steps before.
+/// Prepares a world's next episode as soon as the memory for it is free. Its start does not depend on earlier steps.
 struct PrepareEpisode {
   PhaseArrays arrays;
   template <typename Team>
@@ -237,7 +233,6 @@ struct PrepareEpisode {
   }
 };
 
-/// Launches the phases that begin episode 0 of `seed` in the worlds of the mask, or in all worlds if the mask is null.
 template <typename Launch>
 void launch_reset(const Launch& launch, const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed) {
   launch.teams(arrays.num_worlds, BeginFirstEpisode{arrays, mask, seed});
@@ -246,7 +241,7 @@ void launch_reset(const Launch& launch, const PhaseArrays& arrays, const uint8_t
   launch_write_observations(launch, arrays);
 }
 
-/// Phase that sets the worlds' episode and seed from a restored state.
+/// Sets the worlds' episode and seed from a restored state.
 struct TakeEpisode {
   PhaseArrays arrays;
   template <typename Atomics>
@@ -257,7 +252,6 @@ struct TakeEpisode {
   }
 };
 
-/// Launches the phases that publish a restored state.
 template <typename Launch>
 void launch_publish_restored(const Launch& launch, const PhaseArrays& arrays) {
   const auto num_slots = static_cast<size_t>(arrays.num_slots);

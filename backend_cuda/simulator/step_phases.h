@@ -1,4 +1,4 @@
-// Phases of a step: commands, motion, collisions and reward, the end of the step and of the episode.
+// Phases of a step.
 #pragma once
 
 #include "pictura/backend_cuda/simulator/reset_phases.h"
@@ -6,8 +6,7 @@
 
 namespace pictura::cuda {
 
-/// Phase that finds the lowest slot with a command out of range. Here and below, CommandType is either int32_t (an
-/// action) or Command.
+/// Finds the lowest slot with a command out of range. CommandType: int32_t (an action) or Command.
 template <typename CommandType>
 struct CheckCommands {
   PhaseArrays arrays;
@@ -21,7 +20,7 @@ struct CheckCommands {
   }
 };
 
-/// Phase that moves an agent, or starts it in the prepared episode.
+/// Moves an agent, or starts it in the prepared episode.
 template <typename CommandType>
 struct Advance {
   PhaseArrays arrays;
@@ -47,7 +46,7 @@ struct Advance {
   }
 };
 
-/// Phase that moves the box of a replayed track. `index` numbers the boxes that belong to no agent, over all worlds.
+/// Moves the box of a replayed track. `index` numbers all worlds' boxes that belong to no agent.
 struct ReplayTracks {
   PhaseArrays arrays;
   template <typename ThreadGroup>
@@ -62,7 +61,6 @@ struct ReplayTracks {
   }
 };
 
-/// Phase for collisions, reward and halt of an agent.
 struct ApplyRewardAndHalt {
   PhaseArrays arrays;
   template <typename ThreadGroup>
@@ -77,8 +75,8 @@ struct ApplyRewardAndHalt {
   }
 };
 
-/// Phase that counts a world's step, advances its lights, and determines whether its episode is over. If the episode
-/// was already over, the phase instead completes the move into the next episode.
+/// Counts a world's step, advances its lights, and determines whether its episode is over. If the episode was already
+/// over, the phase instead completes the move into the next episode.
 template <typename CommandType>
 struct FinishStep {
   PhaseArrays arrays;
@@ -116,7 +114,7 @@ struct FinishStep {
     *arrays.rejected_command = rejected_command(*arrays.rejected_slot, commands[*arrays.rejected_slot]);
   }
 
-  /// From the prepared next episode, copies the lights and the boxes that belong to no agent.
+  /// Copies the lights, and the boxes that belong to no agent, from the prepared episode.
   template <typename ThreadGroup>
   PICTURA_HD void take_next(const ThreadGroup& group, int w) const {
     const WorldView world = arrays.world(w), next = arrays.next_world(w);
@@ -135,7 +133,7 @@ struct FinishStep {
   PICTURA_HD bool count(const ThreadGroup& group, int w, SimulatorTotals* totals_out) const {
     const WorldView world = arrays.world(w);
     const int steps = arrays.episode_step[w] + 1;
-    constexpr int kParts = kTotalsBins / ThreadGroup::kSize;  // number of bins that one thread of the group sums up
+    constexpr int kParts = kTotalsBins / ThreadGroup::kSize;  // bins per thread
     SimulatorTotals parts[kParts];
     const auto for_each_agent = [&](const auto& body) {
       for (int part = 0; part < kParts; ++part) {
@@ -158,14 +156,13 @@ struct FinishStep {
     return ends;
   }
 
-  /// Adds up integers in any order, and floating-point numbers in the order of the totals' bins, see
-  /// simulator/totals.h.
+  /// Adds floating-point numbers in the order of the totals' bins (simulator/totals.h).
   template <typename ThreadGroup, int kParts>
   PICTURA_HD static void add_up(const ThreadGroup& group, SimulatorTotals (&parts)[kParts], SimulatorTotals* sum_out) {
     const auto skip = [](auto&, auto) {};
     for (SimulatorTotals& part : parts) {
       const auto add_count = [&group](int64_t& sum, int64_t count) {
-        sum += group.sum(static_cast<int>(count));  // at most the number of a world's agents
+        sum += group.sum(static_cast<int>(count));  // at most a world's agents
       };
       SimulatorTotals::visit(*sum_out, part, add_count, skip);
     }
@@ -178,7 +175,7 @@ struct FinishStep {
   }
 };
 
-/// Phase that, on roads that end, makes waiting agents enter a world after a step that did not end its episode.
+/// Makes waiting agents enter on roads that end, after a step that did not end the episode.
 struct EnterWaiting {
   PhaseArrays arrays;
   template <typename ThreadGroup>
