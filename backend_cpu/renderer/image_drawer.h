@@ -1,7 +1,5 @@
-// Drawing of one image. It sets up the faces of all primitives that may be visible, rasterizes the faces into fragments
-// (each is the part of a pixel that one face covers), and composites each pixel. The rules of drawing are in
-// common/raster, which CUDA kernels share. ImageDrawer adds only the memory, which all images reuse, and the order of
-// the work.
+// Drawing of one image: sets up the faces of visible primitives, rasterizes them into fragments (a fragment is the part
+// of a pixel that one face covers), and composites each pixel. The rules of drawing are in common/raster.
 #pragma once
 
 #include <functional>
@@ -14,7 +12,6 @@
 
 namespace pictura {
 
-/// Inputs of one image.
 struct ImageRequest {
   const CulledGeometry* geometry = nullptr;
   const SceneBatch* scene = nullptr;
@@ -22,36 +19,32 @@ struct ImageRequest {
   PinholeCamera camera;  // in the world
   float line_floor_px = 0;
   bool debug_palette = false;
-  bool culls_occluded = true;    // drop faces behind the boxes and walls that are largest in the image
+  bool culls_occluded = true;    // drop faces behind the largest boxes and walls
   const Crowd* crowd = nullptr;  // sorted boxes of the view's world; null: every box is tested
 };
 
-/// Outputs of one image.
 struct ImageTarget {
   PixelFormat format = PixelFormat::u8;
-  void* color = nullptr;  // memory of one image
+  void* color = nullptr;
   float* depth_m = nullptr;
   uint8_t* class_id = nullptr;
   uint16_t* instance_id = nullptr;
   ChannelOrder order = ChannelOrder::planar;  // or patches
-  int patch_px = kDefaultPatch_px;            // side of the patches
+  int patch_px = kDefaultPatch_px;
   ImageEffect effect;
 };
 
-/// Draws one image at a time. An object must be used by one thread only.
+/// Draws one image at a time, in one thread.
 class ImageDrawer {
  public:
   /// Sets up the faces of an image.
   void prepare(const ImageRequest& request);
-  /// Returns the occluders of the prepared image.
   const Occluders& occluders() const { return setting_.occluders; }
-  /// Draws the prepared image.
   void draw(const ImageTarget& target);
-  /// Adds the agent's visible weight in the prepared image to sum_inout->among_all, and its weight without other
-  /// primitives to sum_inout->alone.
+  /// Adds the agent's visible weight in the prepared image to `among_all`, and its weight without other primitives to
+  /// `alone`.
   void accumulate_visibility(int32_t agent, VisibilitySum* sum_inout);
-  /// Calls visit(y * width + x, coverage, colour) for each fragment of each pixel of the prepared image, front to back.
-  /// Benchmarks use it to measure other methods of compositing.
+  /// Calls visit(y * width + x, coverage, colour) for each pixel's fragments, front to back.
   void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit);
 
  private:
@@ -69,14 +62,14 @@ class ImageDrawer {
     std::vector<PolygonEdge> edges_;
   };
 
-  // A fragment: a face's coverage of a pixel. It is an element of the list of the pixel's fragments.
+  // An element of a pixel's list of fragments.
   struct PixelFragment {
     PixelCoverage coverage;
     int32_t face;
     int32_t next;
   };
 
-  // A face of an agent's box, or a wall.
+  // An agent's face, or a wall.
   struct Solid {
     PrimitiveRef primitive;
     uint32_t entry = 0;
@@ -84,7 +77,6 @@ class ImageDrawer {
     CameraQuad in_camera;
   };
 
-  // The face of a solid on screen, which may occlude other faces.
   struct OccludingFace {
     const Solid* solid = nullptr;
     float covered_px2 = 0;
@@ -92,7 +84,7 @@ class ImageDrawer {
     bool is_clockwise = false;
   };
 
-  // Faces [begin, end), and rows [y_begin, y_end) of the image.
+  // Half-open ranges.
   struct FaceRange {
     int32_t begin, end;
   };
@@ -115,8 +107,7 @@ class ImageDrawer {
   void collect_fragments(int32_t first);
   void order_pixel(int x, int y);
   void resolve_occlusion(RowRange rows);
-  // Composites the pixels of the rows. For each pixel, calls visit(pixel index, fragment, weight) for each fragment,
-  // then finish(pixel index, colour).
+  // Calls visit(pixel index, fragment, weight) for each fragment of a pixel, then finish(pixel index, colour).
   template <typename Visit, typename Finish>
   void composite_rows(RowRange rows, Visit&& visit, Finish&& finish);
   void draw_planes(const ImageTarget& target) const;
@@ -129,13 +120,13 @@ class ImageDrawer {
   std::vector<OccludingFace> occluding_;
   EdgePool edges_;
   std::vector<ScreenFace> faces_;
-  std::vector<int32_t> found_;           // boxes or light heads that may be visible
-  std::vector<int32_t> strips_;          // strips that may be visible
+  std::vector<int32_t> found_;  // boxes or light heads that may be visible
+  std::vector<int32_t> strips_;
   std::vector<float> occluder_bounds_;   // [pixels of the rows] maximum occluder_bound()
-  std::vector<int32_t> first_fragment_;  // [pixels of the rows] first fragment of each list
+  std::vector<int32_t> first_fragment_;  // [pixels of the rows]
   std::vector<PixelFragment> fragments_;
   std::vector<PixelFragment> collected_;
-  std::vector<uint64_t> visible_;                  // visible samples of each collected fragment
+  std::vector<uint64_t> visible_;                  // visible samples, parallel to collected_
   std::vector<std::size_t> pixel_ends_;            // for each pixel, the end of its fragments in collected_
   std::vector<PixelAccumulator::Weight> weights_;  // weights of one pixel's fragments
 };

@@ -1,4 +1,4 @@
-// The functions of common/raster/coverage.h for eight rows or eight pixels in parallel (SIMD).
+// Functions of common/raster/coverage.h for eight rows or pixels in parallel (SIMD).
 #pragma once
 
 #include <bit>
@@ -56,8 +56,7 @@ inline RowSpansX8 row_spans_x8(const PolygonEdge* edges, int count, const PixelB
   return spans;
 }
 
-/// Computes pixel_coverage() for the first num_pixels of eight pixels. Calls visit(lane, coverage) for each of them
-/// whose coverage is not empty.
+/// Calls visit(lane, coverage) for each of the first num_pixels pixels whose pixel_coverage() is not empty.
 #if defined(__AVX2__)
 template <typename Visit>
 inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, const int32_t* x, const int32_t* y,

@@ -1,5 +1,4 @@
-// Culling of eight pieces of a map in parallel (SIMD), by the rules of common/raster/cull.h. The bounding balls of the
-// pieces are stored in the order of a grid's items.
+// Culling of eight pieces of a map in parallel (SIMD), by the rules of common/raster/cull.h.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +17,6 @@ inline Vec3x8 to_camera(const PinholeCamera& camera, const Vec3x8& world_m) {
   return {along(camera.right), along(camera.down), along(camera.forward)};
 }
 
-/// Version of sphere_in_frustum() for eight spheres.
 inline Mask8 sphere_in_frustum(const Frustum& f, const Vec3x8& center, Float8 radius_m) {
   const Mask8 in_range = (center.z + radius_m > kNear_m) & (center.z - radius_m < kVisibleRange_m);
   const Mask8 in_width = ((center.x - f.x_low * center.z) * f.x_low_scale > -radius_m) &
@@ -28,14 +26,14 @@ inline Mask8 sphere_in_frustum(const Frustum& f, const Vec3x8& center, Float8 ra
   return in_range & in_width & in_height;
 }
 
-/// Bounding balls of the items of a grid.
+/// Bounding balls of a grid's items.
 class BallGrid {
  public:
   struct Ball {
     Vec3 middle_m;
     float radius_m = 0;
   };
-  /// ball_of(item) must return the item's bounding ball, and box_of(item) the box with which the grid was built.
+  /// ball_of(item): the item's bounding ball. box_of(item): the box with which the grid was built.
   template <typename BallOf, typename BoxOf>
   BallGrid(const GridView& grid, BallOf&& ball_of, BoxOf&& box_of) : grid_(grid) {
     const std::size_t padded = grid.items.size() + kLanes;
@@ -58,13 +56,12 @@ class BallGrid {
     }
   }
 
-  /// Calls visit(item) for each item that for_each_item() would visit for query_box and whose ball is in the frustum.
-  /// The order is that of for_each_item().
+  /// Like for_each_item(), but visits only items whose ball is in the frustum.
   template <typename Visit>
   void visit_visible(const PinholeCamera& camera, const Frustum& f, const Aabb2& query_box, Visit&& visit) const {
     const CellRange cells = cells_of(grid_, query_box);
     for (int y = cells.y_begin; y < cells.y_end; ++y) {
-      // An item is visited only in the query's first column and first row that contain it.
+      // An item is visited only in the query's first column and row that contain it.
       const int32_t first_column_end = begin(cells.x_begin + 1, y), row_end = begin(cells.x_end, y);
       const int row_starts = y == cells.y_begin ? kStartsRow : 0;
       for (int32_t i = begin(cells.x_begin, y); i < row_end; i += kLanes) {
@@ -82,7 +79,7 @@ class BallGrid {
 
  private:
   static constexpr int kStartsColumn = 1, kStartsRow = 2;
-  // Index of the first item of a cell. If x is num_x, it is the first item of the next row.
+  // Index of the first item of a cell, or of the next row if x is num_x.
   int32_t begin(int x, int y) const {
     return grid_
         .begin[static_cast<std::size_t>(y) * static_cast<std::size_t>(grid_.num_x) + static_cast<std::size_t>(x)];
@@ -91,10 +88,10 @@ class BallGrid {
   GridView grid_;
   // Centres and radii of the grid's items, padded by one vector.
   std::vector<float> x_m_, y_m_, z_m_, radius_m_;
-  std::vector<uint8_t> starts_;  // bits: whether the item's box begins in this cell's column, and in its row
+  std::vector<uint8_t> starts_;  // bits: whether the item's box begins in this cell's column and row
 };
 
-/// Bounding balls, sorted by the cells of their centres. Finds the balls that are in a frustum.
+/// Bounding balls, sorted by the cells of their centres.
 class CenteredBalls {
  public:
   explicit CenteredBalls(const std::vector<BallGrid::Ball>& balls)
@@ -107,7 +104,7 @@ class CenteredBalls {
   CenteredBalls(const CenteredBalls&) = delete;
   CenteredBalls& operator=(const CenteredBalls&) = delete;
 
-  /// Writes the indices of the balls for which sphere_in_frustum() is true, in ascending order.
+  /// Writes the indices of the balls in the frustum, in ascending order.
   void find_visible(const PinholeCamera& camera, const Frustum& f, std::vector<int32_t>* found_out) const {
     found_out->clear();
     const Aabb2 box = ground_box_of_spheres(camera, f, largest_radius_m_);
@@ -117,7 +114,7 @@ class CenteredBalls {
   }
 
  private:
-  /// Clamps positions that are far outside any map, so that the grid stays small.
+  /// Clamps positions far outside any map, so that the grid stays small.
   static Vec2 within_bounds(Vec2 p) {
     constexpr float kBound_m = 1e6f;
     return {clamp(p.x, -kBound_m, kBound_m), clamp(p.y, -kBound_m, kBound_m)};
@@ -148,7 +145,7 @@ class CenteredBalls {
 class Crowd {
  public:
   explicit Crowd(Span<const AgentBox> boxes) : agents_(drawn(boxes)), balls_(balls_of(boxes, agents_)) {}
-  /// Writes the indices of the boxes for which may_be_visible() is true, in ascending order.
+  /// Writes the indices of boxes that may be visible, in ascending order.
   void find_visible(const PinholeCamera& camera, const Frustum& f, std::vector<int32_t>* found_out) const {
     balls_.find_visible(camera, f, found_out);
     for (int32_t& found : *found_out) found = agents_[found];
@@ -172,7 +169,6 @@ class Crowd {
   CenteredBalls balls_;
 };
 
-/// A geometry with the bounding balls of its strips, walls and light heads.
 struct CulledGeometry {
   /// The view's arrays must outlive the object.
   explicit CulledGeometry(const StaticGeometryView& geometry)

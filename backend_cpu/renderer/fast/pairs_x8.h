@@ -8,7 +8,6 @@
 
 namespace pictura {
 
-/// Eight pairs of fragments.
 struct PairsX8 {
   const ScreenFace* a[kLanes];
   const ScreenFace* b[kLanes];
@@ -17,7 +16,7 @@ struct PairsX8 {
   alignas(32) float y[kLanes];
 };
 
-/// Version of centroid_of() for eight masks, which must not be 0.
+/// Version of centroid_of() for eight masks, none of which is 0.
 inline Vec2x8 centroid_of_x8(const uint64_t* samples) {
   int32_t count[kLanes], columns[kLanes], rows[kLanes], offsets[kLanes];
   for (int lane = 0; lane < kLanes; ++lane) {
@@ -32,7 +31,6 @@ inline Vec2x8 centroid_of_x8(const uint64_t* samples) {
           (load8_integers(rows) + (load8_integers(offsets) + 0.5f * n) / 8.0f) / (8.0f * n)};
 }
 
-/// Members of eight faces that determine their order.
 struct FacesX8 {
   Float8 inverse_depth_x, inverse_depth_y, inverse_depth_0, inverse_depth_low, inverse_depth_high, plane_distance_m;
   Float8 object_id;  // as the bits of a float
@@ -55,7 +53,7 @@ struct FacesX8 {
   Mask8 are_strips() const { return ~less_bits(object_id, float_from_bits(kStripKind << kKindShift)); }
 
  private:
-  // Loads the four members of each face that begin at kOffset.
+  // Loads four members of each face from kOffset on.
   template <std::size_t kOffset>
   static void load_four(const ScreenFace* const* face, Float8* members_out) {
     static_assert(offsetof(ScreenFace, object_id) == offsetof(ScreenFace, inverse_depth_x) + 3 * sizeof(float));
@@ -66,9 +64,8 @@ struct FacesX8 {
   }
 };
 
-/// Order of eight pairs, as bit masks of lanes. `a_first`: a is in front of b at all shared samples. `undecided`:
-/// occlude_pair() must decide, because the faces belong to one primitive, may intersect in the pixel, or are a solid
-/// and a strip on which it may stand.
+/// Order of eight pairs, as bit masks of lanes. a_first: a is in front of b at all shared samples. undecided:
+/// occlude_pair() must decide.
 struct PairOrder {
   unsigned a_first = 0, undecided = 0;
 };

@@ -1,5 +1,5 @@
-// Set-up of eight strips in parallel (SIMD), by the rules of common/raster from strip_quad() to is_quad_visible(). It
-// does not make the strips' edges.
+// Set-up of eight strips in parallel (SIMD), by the rules of common/raster from strip_quad() to is_quad_visible(),
+// without edges.
 #pragma once
 
 #include <cstddef>
@@ -9,15 +9,14 @@
 
 namespace pictura {
 
-/// Eight strips on screen.
 struct StripsX8 {
-  unsigned visible = 0;   // bits of the SIMD lanes whose strips need no clipping, are large enough and are not occluded
+  unsigned visible = 0;   // lanes of strips that need no clipping, are large enough and are not occluded
   unsigned crossing = 0;  // lanes of strips that must be clipped first
   unsigned clockwise = 0;
   Vec2x8 corner[4];
   Vec2x8 low, high;  // bounds on screen
   Float8 inverse_depth_low, inverse_depth_high;
-  Vec3x8 normal;  // normal of the plane
+  Vec3x8 normal;
   Float8 offset;
   Vec3x8 color;  // red, green, blue
 
@@ -85,9 +84,7 @@ inline Mask8 occludes(const Occluders& occluders, const PinholeCamera& camera, c
   return are_occluded;
 }
 
-/// Sets up eight strips.
 inline StripsX8 set_up_strips(const ImageSetting& setting, const Strip* const* strip) {
-  // Loads the members of the strips, four at a time.
   static_assert(offsetof(Strip, color) == 11 * sizeof(float));
   Float8 member[16];
   for (int first : {0, 4, 8, 12}) {

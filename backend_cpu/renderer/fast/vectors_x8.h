@@ -6,7 +6,6 @@
 namespace pictura {
 
 constexpr int kLanes = 8;
-/// Returns the lane indices 0 to 7.
 inline Float8 lane_numbers() { return set8(0, 1, 2, 3, 4, 5, 6, 7); }
 
 struct Vec2x8 {
