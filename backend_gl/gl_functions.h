@@ -1,5 +1,4 @@
-// Table of the OpenGL 4.5 functions that this folder uses, loaded from a context's library. Nothing is linked, and one
-// process can use both libraries (OSMesa and EGL).
+// The OpenGL 4.5 functions that this folder uses, loaded from a context's library.
 #pragma once
 
 #define GL_GLEXT_PROTOTYPES
@@ -30,7 +29,7 @@ struct Functions {
   PICTURA_GL_FUNCTIONS(PICTURA_GL_DECLARE)
 #undef PICTURA_GL_DECLARE
 
-  /// Loads every function. Throws Error naming a function that the context lacks.
+  /// Throws Error naming a function that the context lacks.
   explicit Functions(const Context& context);
 
   int integer(GLenum name) const {

@@ -1,5 +1,4 @@
-// Images of one size as the layers of one array texture, which holds all samples of each pixel. A pass averages the
-// samples into planar images in a buffer.
+// Images of one size as layers of an array texture with all samples. A pass averages the samples into planar images.
 #pragma once
 
 #include <initializer_list>
@@ -13,39 +12,36 @@
 
 namespace pictura::gl {
 
-/// Compiles and links a program. Throws Error with the compiler's log.
+/// Throws Error with the compiler's log.
 GLuint make_program(const Functions& gl, std::initializer_list<std::pair<GLenum, std::string>> shaders);
 
-/// Throws Error if OpenGL has reported an error. The message begins with `where`.
+/// Throws Error if OpenGL has reported an error. where: begin of the message.
 void check_errors(const Functions& gl, const std::string& where);
 
-/// Images as layers of an array texture. The context must be current in all calls, including the destructor.
+/// Images of one size. The context must be current in all calls, including the destructor.
 class ImageArray {
  public:
-  /// Messages of errors begin with `renderer`. Images are copied to device memory if `interop` is not null, else to the
-  /// host. Throws Error if the driver cannot store one image with this number of samples.
+  /// Error messages begin with `renderer`. `interop` copies images to device memory; if it is null, images are copied
+  /// to the host. Throws Error if the driver cannot store one image with these samples.
   ImageArray(const Functions& gl, std::string renderer, const PixelSamples& samples, const CudaInterop* interop,
              int width_px, int height_px);
   ~ImageArray() { release(); }
   ImageArray(const ImageArray&) = delete;
   ImageArray& operator=(const ImageArray&) = delete;
 
-  /// Allocates memory for up to `images` images. The driver and a fixed maximum may limit this number. Returns the
-  /// number of allocated images.
+  /// Returns the number of allocated images, which the driver and a fixed maximum may limit.
   int reserve(int64_t images, PixelFormat format);
-  /// Clears all layers and makes them the render target.
+  /// Clears all layers, the new render target.
   void begin();
-  /// Averages the samples of the first `images` layers into the buffer.
+  /// Averages the first `images` layers into the buffer.
   void resolve(int images);
-  /// Appends to copies_out the copies that copy() must make to bring consecutive images to `out`. Each image has three
-  /// planes, and there are `stride` values from one image to the next.
+  /// Appends to copies_out the copies of `images` images, from `first` on, to `out`. stride: values from one image to
+  /// the next.
   void plan_copy(int first, int images, void* out, int64_t stride, std::vector<RowCopy>* copies_out) const;
-  /// Copies images. Copies to the host are finished when the call returns; copies to a device are enqueued on the
-  /// stream.
+  /// Copies to the host are finished when the call returns; copies to a device are enqueued.
   void copy(Span<const RowCopy> copies, Stream stream);
 
  private:
-  // Maximum number of layers in the current format.
   int max_layers() const;
   std::size_t plane_bytes() const;
   GLuint make_texture(GLenum format) const;
@@ -57,7 +53,7 @@ class ImageArray {
   const std::string renderer_;
   const PixelSamples samples_;
   const CudaInterop* interop_;
-  const int width_px_, height_px_;  // size of an image
+  const int width_px_, height_px_;
   PixelFormat format_ = PixelFormat::u8;
   int layers_ = 0;
   GLuint color_ = 0, depth_ = 0, framebuffer_ = 0, output_ = 0, resolve_program_ = 0;

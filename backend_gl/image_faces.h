@@ -1,5 +1,4 @@
-// The faces that one image may show, in camera coordinates. Their shapes, colours and widths follow the rules of all
-// renderers (common/raster/). OpenGL projects and clips the faces and decides which are visible.
+// The faces that one image may show, by the rules of common/raster/.
 #pragma once
 
 #include <utility>
@@ -9,17 +8,15 @@
 
 namespace pictura::gl {
 
-/// Bounds on the ratio of the depth of a strip's corner to the depth of FaceInstance::compared_plane at the same screen
-/// point. The minimum applies beyond the plane's horizon, where the plane counts as infinitely deep. As in the CPU
-/// renderer, the plane's depth counts as at least the corner's depth / kWidenedDepth. (The CPU renderer uses the
-/// nearest corner of the strip for this bound.)
+/// Bounds on the ratio of a strip corner's depth to the depth of FaceInstance::compared_plane at the same screen point.
+/// Beyond the plane's horizon, the minimum applies. The maximum is that of the CPU renderer.
 constexpr float kMinInverseDepth = 1e-4f, kMaxInverseDepth = kWidenedDepth;
 
-/// One instance of the draw call: a flat quadrilateral, in camera coordinates.
+/// A flat quadrilateral in camera coordinates: one instance of the draw call.
 struct FaceInstance {
   Vec3 corner[4];  // in order around the quadrilateral
-  // The depth test uses the depth of the plane of all points p with dot(compared_plane, p) = 1. If compared_plane is 0,
-  // it uses the face's own depth.
+  // The depth test uses the plane of all points p with dot(compared_plane, p) = 1; if compared_plane is 0, the face's
+  // own plane.
   Vec3 compared_plane;
   Rgb color;
   int32_t layer = 0;  // layer of the image array
@@ -27,7 +24,7 @@ struct FaceInstance {
 
 class ImageFaces {
  public:
-  /// Replaces the faces by those of one camera of the view. `scene` must be in host memory.
+  /// Collects the faces of one camera of the view. `scene` must be in host memory.
   void build(const ImageSetting& setting, const StaticGeometryView& geometry, const SceneBatch& scene, const View& view,
              int32_t layer);
   Span<const FaceInstance> faces() const { return faces_; }

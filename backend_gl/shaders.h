@@ -1,13 +1,11 @@
-// The two programs of the pipeline. One draws faces into samples, and one averages samples into the caller's planar
-// images.
+// The pipeline's two programs: drawing and averaging of samples.
 #pragma once
 
 namespace pictura::gl {
 
-/// Vertex shader of faces. Hardware rounds the positions of corners to 1/n of a texel (GL_SUBPIXEL_BITS) but does not
-/// adapt their depths. This tilts the plane of a face. Near the horizon, the depth error exceeds the depth difference
-/// between strips of one level. So this shader rounds the positions, and computes depths at the rounded positions.
-/// Except for rounding errors, strips of one plane then have equal depths, wherever their corners are.
+/// Vertex shader of faces. Hardware rounds the positions of corners (GL_SUBPIXEL_BITS) but does not adapt their depths,
+/// which tilts faces. Near the horizon, this error exceeds the depth difference between strips of one level. So this
+/// shader rounds the positions itself, and computes depths there.
 constexpr const char* kFaceVertexShader = R"(#version 450 core
 #extension GL_ARB_shader_viewport_layer_array : require
 layout(location = 0) in vec3 corner0;  // camera coordinates
@@ -47,8 +45,8 @@ out vec4 color;
 void main() { color = vec4(face_color, 1.0); }
 )";
 
-/// Compute shader that averages samples. The source must be preceded by definitions of MULTISAMPLE and PACKED as 0 or
-/// 1. An invocation writes one word of each colour plane: four bytes (PACKED) or one float.
+/// Compute shader that averages samples. Definitions of MULTISAMPLE and PACKED as 0 or 1 must precede it. An invocation
+/// writes one word of each colour plane: four bytes (PACKED) or one float.
 constexpr const char* kResolveShader = R"(
 #if MULTISAMPLE
 uniform sampler2DMSArray drawn;

@@ -1,6 +1,5 @@
-// Interoperability of this backend with CUDA on one GPU: scenes are read from device memory, and images are copied to
-// device memory without a copy on the host. This header uses no CUDA types, because interop.cpp is built only with
-// CUDA.
+// Interoperability with CUDA: scenes are read from device memory, and images are copied there without a copy on the
+// host. This header uses no CUDA types.
 #pragma once
 
 #include <memory>
@@ -22,12 +21,12 @@ struct RowCopy {
 class CudaBuffer {
  public:
   virtual ~CudaBuffer() = default;
-  /// Enqueues copies to device memory on the stream. They run after all earlier OpenGL commands and before all later
-  /// OpenGL commands. The buffer's context must be current.
+  /// Enqueues copies to device memory on the stream, after all earlier and before all later OpenGL commands. The
+  /// buffer's context must be current.
   virtual void copy(Span<const RowCopy> copies, Stream stream) = 0;
 };
 
-/// A host copy of a scene and its views.
+/// A host copy of a scene.
 struct HostScene {
   std::vector<int32_t> world_begin, light_begin, hidden_agents;
   std::vector<AgentBox> agents;
@@ -44,19 +43,17 @@ struct HostScene {
 class CudaInterop {
  public:
   virtual ~CudaInterop() = default;
-  /// CUDA device that all calls use. Callers need not make it current.
+  /// Callers need not make the device current.
   virtual Device device() const = 0;
-  /// Waits for the work on a stream.
   virtual void synchronize(Stream stream) const = 0;
   /// Registers a buffer object of the current context.
   virtual std::unique_ptr<CudaBuffer> share(unsigned int buffer) const = 0;
-  /// Waits for the stream, then copies a scene and its views from device memory to the host.
+  /// Waits for the stream first.
   virtual void copy_to_host(const SceneBatch& scene, const ViewBatch& views, Stream stream,
                             HostScene* scene_out) const = 0;
 };
 
-/// Makes the interface to a CUDA device. Throws Error if the device cannot be used. This function is defined only in
-/// builds with CUDA.
+/// Throws Error if the device cannot be used. Defined only in builds with CUDA.
 std::unique_ptr<CudaInterop> make_cuda_interop(Device device);
 
 }  // namespace pictura::gl
