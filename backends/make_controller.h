@@ -1,4 +1,4 @@
-// Makes controllers by name, for simulators on the host and on CUDA devices.
+// Controllers by name.
 #pragma once
 
 #include <memory>
@@ -10,10 +10,10 @@
 
 namespace pictura {
 
-/// Makes a controller: "random" (uniform actions, keyed by seed, world, agent and step), "idle" (no jerk), "lane" (the
-/// lane keeper), and in recorded scenes "log", "inverse" and "idm"; see host_controllers.h. "lane" and "idm" run on the
-/// host even if the simulator's memory is on a CUDA device, and their name() states this. The controller serves only
-/// this simulator, which must outlive it. Throws UsageError listing the known names.
+/// Makes a controller by a name of host_controllers.h. Controllers with drives_on_host() run on the host even if the
+/// simulator is on a CUDA device. Random actions are keyed by seed, world, agent and step. The simulator must outlive
+/// the controller. Throws UsageError for an unknown name, listing the known names, or if the controller cannot drive in
+/// a world.
 std::unique_ptr<Controller> make_controller(const std::string& name, Simulator& simulator, uint64_t seed);
 
 }  // namespace pictura

@@ -11,13 +11,13 @@
 
 namespace pictura {
 
-/// Makes the executor of a learner. Throws Error if the device is a CUDA device that does not exist.
+/// Throws Error for a CUDA device that does not exist.
 std::unique_ptr<LearnerExecutor> make_learner_executor(Device device);
 std::unique_ptr<SceneHistory> make_scene_history(Device device, const SceneHistorySize& size);
 
-/// Captures the calls that `work` enqueues on `stream` as a CUDA graph. The stream must not be the legacy default
-/// stream. The calls are executed only when the graph is launched. Throws the exceptions of `work`. Throws Error if the
-/// device is the host, or if `work` allocates memory or waits.
+/// Captures the calls that `work` enqueues on `stream` as a CUDA graph, without executing them. `stream` must not be
+/// the legacy default stream. Throws the exceptions of `work`, and Error if the device is the host, or if `work`
+/// allocates or waits.
 std::unique_ptr<DeviceGraph> capture_graph(Device device, Stream stream, const std::function<void()>& work);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Upload of compiled maps to the renderers that draw scenes on them.
+// Upload of compiled maps to renderers.
 #pragma once
 
 #include "pictura/common/renderer.h"
@@ -6,8 +6,7 @@
 
 namespace pictura {
 
-/// Uploads each map to its handle. If `handles` is empty, the handles are 0, 1, ..., which a simulator uses for its
-/// maps by default.
+/// handles: one per map; empty: 0, 1, ..., which simulators use by default.
 inline void upload_maps(const CompiledMaps& maps, Span<const GeometryHandle> handles, Renderer* renderer_out,
                         Stream stream = {}) {
   for (std::size_t i = 0; i < maps.size(); ++i) {
@@ -15,7 +14,7 @@ inline void upload_maps(const CompiledMaps& maps, Span<const GeometryHandle> han
   }
 }
 
-/// Uploads the simulator's maps to the handles that its scene uses.
+/// Uploads the simulator's maps to its handles.
 inline void upload_maps(const Simulator& simulator, Renderer* renderer_out, Stream stream = {}) {
   upload_maps(simulator.maps(), simulator.handles(), renderer_out, stream);
 }
