@@ -1,5 +1,4 @@
-// Differences between the values of images and of the oracle's images (the CPU renderer's), and the tolerance for the
-// CUDA renderer.
+// Differences between images and the images of the oracle (the CPU renderer).
 #pragma once
 
 #include <cstddef>
@@ -8,30 +7,27 @@
 
 namespace pictura {
 
-/// Errors of images. Channel values are in [0, 1].
+/// Errors of channel values in [0, 1].
 struct ImageError {
   int64_t values = 0, differing = 0;
   int64_t beyond = 0;  // errors above kKernelError
   double worst = 0;
-  // Number of pixels with planes (depth, class, instance), and number of those pixels at which the planes show
-  // different surfaces.
+  // Pixels with planes, and pixels whose planes show different surfaces.
   int64_t plane_pixels = 0, differing_plane_pixels = 0;
 
   void add(const ImageError& other);
-  /// Whether the errors are within the tolerance of the CUDA renderer (bench/truth/tolerances.h).
+  /// Whether the errors are within the CUDA renderer's tolerance (bench/truth/tolerances.h).
   bool is_within_tolerance() const;
 };
 
-/// Compares one view's image of one camera, and the image's planes if present. Both images must have the same format,
-/// size and order.
+/// Compares one camera's image of one view, and its planes. Images must have the same format, size and order.
 ImageError compare_image(const CameraImages& actual, const CameraImages& expected, PixelFormat format, int view,
                          ChannelOrder order = ChannelOrder::planar, int patch_px = kDefaultPatch_px);
 
-/// Byte that fills images before drawing, so that unwritten values are found. Floats and halves of this byte are far
-/// from any colour, and it is no valid depth, class or instance.
+/// Byte that fills images before drawing, to find unwritten values.
 constexpr int kUnwrittenByte = 0x7F;
 
-/// Calls visit(first byte, bytes from row to row, bytes of a row, number of rows) for all memory of colours and planes.
+/// Calls visit(first byte, bytes from row to row, bytes of a row, number of rows) for colours and planes.
 template <typename Visit>
 void visit_memory(const ImageBatch& images, Visit&& visit) {
   const auto views = static_cast<std::size_t>(images.num_views);
@@ -50,7 +46,6 @@ void visit_memory(const ImageBatch& images, Visit&& visit) {
   }
 }
 
-/// Fills images on the host with kUnwrittenByte.
 void fill_unwritten(const ImageBatch& images);
 
 }  // namespace pictura

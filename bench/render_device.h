@@ -10,12 +10,10 @@
 
 namespace pictura {
 
-/// Makes a device target that measures time with events on the stream. This time includes the device's waits for the
-/// host between launches.
+/// The target measures time with events, including the device's waits for the host.
 std::unique_ptr<RenderTarget> make_device_target(const DrivenWorlds& worlds, const RenderCase& render_case);
 
-/// Measures the device memory that all processes together have allocated since construction. A thread polls
-/// cudaMemGetInfo.
+/// Measures the device memory that all processes have allocated since construction. A thread polls it.
 class DeviceMemoryMeter {
  public:
   DeviceMemoryMeter();
@@ -24,7 +22,7 @@ class DeviceMemoryMeter {
   DeviceMemoryMeter& operator=(const DeviceMemoryMeter&) = delete;
 
   double used_bytes() const;
-  /// Returns the peak, including the current use. Throws Error if polling failed.
+  /// Throws Error if polling failed.
   double max_bytes() const;
 
  private:

@@ -1,5 +1,5 @@
-// Long-running comparison of a renderer with the oracle (the CPU renderer). It compares colours (u8, f16 and f32,
-// planar), planes and visibility. Scenes, views, rigs and settings are random, drawn from a seed.
+// Long-running comparison of a renderer with the oracle (the CPU renderer) in random scenes: colours (u8, f16 and f32,
+// planar), planes and visibility.
 #pragma once
 
 #include <functional>
@@ -14,23 +14,21 @@ namespace pictura {
 
 struct SoakOptions {
   std::vector<std::string> maps;
-  int agents = 120, parked_cars = 32;  // maximum numbers in a scene
+  int agents = 120, parked_cars = 32;  // maxima in a scene
   int views = 16;                      // views per scene
-  int64_t first_scene = 0;             // scenes are numbered from 0 and depend only on their number and the seed
+  int64_t first_scene = 0;             // a scene depends only on its number and the seed
   int64_t max_scenes = 0;              // 0: only time is limited
   double max_seconds = 480;
   uint64_t seed = 0;
   int num_threads = 0;  // 0: all
 };
 
-/// An image that is out of tolerance.
 struct SoakFault {
   int64_t scene = 0;
   int view = 0, camera = 0;
   ImageError error;
 };
 
-/// An answer to a visibility query that differs from the oracle's answer.
 struct VisibilityFault {
   int64_t scene = 0;
   VisibilityQuery query;
@@ -38,7 +36,7 @@ struct VisibilityFault {
 };
 
 struct SoakResult {
-  std::string choice;  // choice_out of the last call of MakeRenderer
+  std::string choice;  // see MakeRenderer
   int64_t scenes = 0, images = 0, queries = 0;
   double seconds = 0;
   ImageError error;  // summed over all images
@@ -49,13 +47,11 @@ struct SoakResult {
   int64_t first_faulty_scene = -1;
 };
 
-/// Function that makes the compared renderer, for scenes in host memory. It is called once per scene, and may write to
-/// choice_out how the renderer was chosen.
+/// Makes the compared renderer, once per scene.
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const RendererConfig&, std::string* choice_out)>;
 
-/// Compares scene by scene, and calls on_scene(result so far) after each scene. If a renderer cannot be made or drawing
-/// fails, throws an Error that names the scene. This happens with `gl`, which supports no planes, halves or visibility.
-/// Throws the UsageErrors of `make` unchanged.
+/// Calls on_scene(result so far) after each scene. If a renderer cannot be made or drawing fails, throws an Error that
+/// names the scene. Throws the UsageErrors of `make` unchanged.
 SoakResult soak(const SoakOptions& options, const MakeRenderer& make,
                 const std::function<void(const SoakResult&)>& on_scene);
 

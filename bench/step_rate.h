@@ -1,5 +1,4 @@
-// Step rate of a simulator with any backend. Random actions are written to the simulator's memory beforehand, so that
-// only steps are timed.
+// Step rate of a simulator with any backend.
 #pragma once
 
 #include <memory>
@@ -9,7 +8,7 @@
 
 namespace pictura {
 
-/// One timed run of steps. Its time includes the wait for its end.
+/// A timed run of steps, including the wait for its end.
 struct StepTiming {
   int64_t steps = 0;
   double elapsed_s = 0;
@@ -17,8 +16,7 @@ struct StepTiming {
   int64_t slot_steps = 0;
 };
 
-/// Steps one simulator with uniform random actions. A number of sets of actions is drawn and uploaded beforehand, and
-/// steps use the sets cyclically.
+/// Steps a simulator with uniform random actions, which are uploaded beforehand and used cyclically.
 class StepBench {
  public:
   StepBench(Simulator* simulator, uint64_t seed);
@@ -26,10 +24,9 @@ class StepBench {
   StepBench(const StepBench&) = delete;
   StepBench& operator=(const StepBench&) = delete;
 
-  /// Takes `steps` steps and waits for their end.
   StepTiming run(int64_t steps);
-  /// Takes steps for at least duration_s seconds. After every steps_between_clock_reads steps, waits for their end and
-  /// reads the clock.
+  /// Takes steps for at least duration_s seconds. Waits and reads the clock after every steps_between_clock_reads
+  /// steps.
   StepTiming run_for(double duration_s, int64_t steps_between_clock_reads);
 
  private:

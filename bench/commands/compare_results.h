@@ -1,5 +1,4 @@
-// Comparison of a measurement with an earlier result of the same benchmark, to detect regressions. It compares ratios
-// of medians with the spread of the repeats.
+// Comparison of a measurement with an earlier result, to detect regressions.
 #pragma once
 
 #include <string>
@@ -9,7 +8,7 @@
 
 namespace pictura {
 
-/// Change of a result against the earlier result of the same name. undirected: the unit has no better direction.
+/// undirected: the unit has no better direction.
 enum class Change { better, worse, within_spread, undirected };
 
 struct Comparison {
@@ -20,19 +19,19 @@ struct Comparison {
   Change change = Change::undirected;
 };
 
-/// Compares rows of the same `name` and `unit` in two reports; other rows are omitted. Rows also have the keys `value`,
-/// `min` and `max`. Rates (units "..._per_s") are better if greater; times and memory (s, ms, GB, GiB) are better if
-/// smaller; other units have no direction. A row is better or worse only if the ranges from min to max do not overlap.
+/// Compares rows of equal `name` and `unit`, with the keys `value`, `min` and `max`. Rates (units "..._per_s") are
+/// better if greater; times and memory (s, ms, GB, GiB) are better if smaller. A row is better or worse only if the
+/// ranges from min to max do not overlap.
 std::vector<Comparison> compare_results(const Json& before_rows, const Json& after_rows);
 
-/// An earlier report, which a benchmark printed with --json.
+/// A report that a benchmark printed with --json.
 class EarlierReport {
  public:
   /// Throws Error naming the file if it cannot be read or is not a benchmark report.
   explicit EarlierReport(const std::string& path);
 
-  /// Adds the key "comparison" to a report. It contains the file, commit and device of the earlier report, whether
-  /// workload and device are equal, and the ratios.
+  /// Adds the key "comparison" to a report: file, commit and device of the earlier report, whether workload and device
+  /// are equal, and the ratios.
   void add_comparison(Json* report_inout) const;
   /// Prints the ratios as text, after a warning if the workload or the device differs.
   void print_comparison(const Json& report) const;

@@ -1,5 +1,4 @@
-// Code that `pictura bench train` and `pictura bench breakdown` share: trains some updates of a configuration and
-// measures their costs.
+// Measurement of some updates of a training run.
 #pragma once
 
 #include <string>
@@ -21,22 +20,22 @@ struct TrainingCase {
 
 struct TrainingMeasurement {
   std::vector<UpdateCost> updates;  // after the warm-up
-  UpdateCost profiled;              // the additional update, in which `kernels` were timed
+  UpdateCost profiled;              // additional update
   std::vector<KernelTime> kernels;
   TrainReport report;
 };
 
-/// Trains in a temporary folder. The learning rate stays constant, so that no schedule ends. Throws Error if an update
-/// took no agent-step or no minibatch. Throws Error if the unchanged policy computes different probabilities of actions
-/// in learning than in the rollout, because its observations are then wrong. Throws the exceptions of train().
+/// Trains in a temporary folder, at a constant learning rate. Throws Error if an update took no agent-step or no
+/// minibatch. Throws Error if the unchanged policy's action probabilities differ between rollout and learning. Throws
+/// the exceptions of train().
 TrainingMeasurement measure_training(const TrainingCase& training_case);
 
-/// Wall time of an update in seconds, and the part of it that is outside all phases.
+/// Wall time of an update, and its part outside all phases, in seconds.
 double wall_s(const UpdateCost& cost);
 double other_s(const UpdateCost& cost);
 inline double phase_s(const UpdateCost& cost, Phase phase) { return cost.phases_s[static_cast<size_t>(phase)]; }
 
-/// Returns one value per update.
+/// One value per update.
 template <typename Value>
 BenchResult result_of(const TrainingMeasurement& measurement, const std::string& name, const std::string& unit,
                       const Value& value) {
@@ -45,7 +44,7 @@ BenchResult result_of(const TrainingMeasurement& measurement, const std::string&
   return result;
 }
 
-/// Returns the device and driver of a training run; `backend` names the simulator, the renderer and the learner.
+/// The result's `backend` names the simulator, the renderer and the learner.
 BenchContext training_context(const std::string& workload, const TrainReport& report);
 
 }  // namespace pictura

@@ -1,5 +1,4 @@
-// Synthetic scenes for tests and benchmarks of renderers: streets with lane marks, edges, crosswalks, cars, people,
-// walls and lights.
+// Synthetic scenes for tests and benchmarks of renderers.
 #pragma once
 
 #include <string>
@@ -9,12 +8,11 @@
 
 namespace pictura {
 
-/// Appends a polyline, open or closed, as strips of this kind.
+/// Appends an open or closed polyline as strips.
 void add_polyline(StaticGeometry* geometry, std::vector<Vec3> points_m, float width_m, StripKind kind);
 
-/// A scene with its views. make_synthetic_town() makes a random town: a grid of streets 60 m apart, crosswalks and
-/// lights at crossings, walls along blocks, and num_agents agents, which stand on the streets without touching each
-/// other.
+/// A scene with its views. make_synthetic_town() makes a random town: streets 60 m apart, crosswalks, lights, walls,
+/// and num_agents agents, which do not touch.
 struct Snapshot {
   StaticGeometry geometry;
   SceneOwner scene;  // one world with handle 0
@@ -22,13 +20,11 @@ struct Snapshot {
 };
 Snapshot make_synthetic_town(uint64_t seed, int num_agents);
 
-/// Makes a town of strips and walls with a crowd of 900 people, seen from above and from the side. The crowd has far
-/// more faces than fit into the shared memory of CUDA kernels.
+/// Makes a crowd of 900 people, seen from above and the side. Its faces exceed a CUDA block's shared memory.
 Snapshot make_crowd();
 
-/// Four worlds on two towns: the second town, the first town without agents, the first town, and the second town
-/// without lights. The world without agents has one view. Each other world has three views, each of which hides a
-/// different third of the town's vehicles.
+/// Four worlds: the second town, the first town without agents (one view), the first town, and the second town without
+/// lights. Each other world has three views, which hide different thirds of the vehicles.
 struct SyntheticWorlds {
   std::vector<StaticGeometry> maps;
   SceneOwner scene;
@@ -36,31 +32,28 @@ struct SyntheticWorlds {
 };
 SyntheticWorlds make_synthetic_worlds();
 
-/// Makes a bridge with marks and cars over a road with marks and cars, seen from the road, from the bridge, and from
-/// above.
+/// Makes a bridge over a road, both with cars, seen from the road, the bridge and above.
 Snapshot make_bridge();
 
-/// Makes a road that climbs by 12 %, with marks, a stop line, walls, lights and upright agents, and a bridge over the
-/// road. It is seen uphill, downhill, and from the bridge.
+/// Makes a road that climbs by 12 % under a bridge, with upright agents, seen uphill, downhill, and from the bridge.
 Snapshot make_hill();
 
-/// Makes cars that have driven into each other, in front of a wall that one car has driven into. They are seen from
-/// both sides.
+/// Makes cars that have driven into each other and into a wall, seen from both sides.
 Snapshot make_crash();
 
-/// Returns a rig of one camera that faces forward, 1.5 m above the origin of the ego frame. Its numbers are round.
+/// One camera that faces forward, 1.5 m above the ego frame's origin.
 Rig simple_rig(int width_px = 100, int height_px = 100, float focal_px = 50);
 
-/// Returns a rig of the first camera of paper_rig().
+/// The first camera of paper_rig().
 Rig front_rig(int width_px = 96, int height_px = 54);
 
-/// Returns four cameras: two of 97x55 pixels, one of 1x1 and one of 40x130.
+/// Two cameras of 97x55 pixels, one of 1x1 and one of 40x130.
 Rig mixed_rig();
 
-/// Returns eight cameras of eight sizes, with different pitch and roll angles.
+/// Cameras of eight sizes, with different pitch and roll angles.
 Rig eight_camera_rig();
 
-/// Difficult scenes, each with a rig: hills, bridges, intersecting solids, odd sizes, one pixel.
+/// Difficult scenes: hills, bridges, intersecting solids, odd sizes, one pixel.
 struct HardScene {
   std::string name;
   Snapshot town;
@@ -68,7 +61,7 @@ struct HardScene {
 };
 std::vector<HardScene> hard_scenes();
 
-/// All images of a batch, camera by camera: colours as floats, and the optional planes (depth, class, instance).
+/// All images of a batch, camera by camera.
 struct Outputs {
   std::vector<float> color;
   std::vector<float> depth_m;

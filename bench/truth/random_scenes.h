@@ -1,6 +1,4 @@
-// Small random scenes in which two surfaces have nearly the same depth, or in which an exception of a drawing rule
-// applies. There is one kind of scene per rule. `pictura bench quality --random` and tests measure the CPU renderer on
-// these scenes.
+// Small random scenes in which two surfaces have nearly the same depth, or an exception of a drawing rule applies.
 #pragma once
 
 #include <iterator>
@@ -10,12 +8,12 @@
 namespace pictura {
 
 enum class RandomKind {
-  near_plane,          // strips that cross the near plane, next to and below a camera close to the road
-  bridge_from_below,   // cars and walls on the strips of a bridge or a ramp, seen from the road below
+  near_plane,          // strips that cross the near plane of a camera close to the road
+  bridge_from_below,   // cars and walls on a bridge or a ramp, seen from the road below
   crashed_boxes,       // boxes driven into each other, with faces in one plane
   intersecting_walls,  // walls that cross each other, partly behind boxes
   wide_strips,         // strips widened by 2 to 8 px up to the horizon and beyond
-  walls_on_strips,     // walls that stand on strips, with their lower edge up to 40 cm below the strips
+  walls_on_strips,     // walls whose lower edge is up to 40 cm below their strips
   level_edges,         // level edges of walls and boxes, one closely above the other
 };
 constexpr const char* kRandomKindNames[] = {
@@ -23,13 +21,12 @@ constexpr const char* kRandomKindNames[] = {
     "strips wider than 2 px",       "walls on strips",    "level edges"};
 constexpr int kNumRandomKinds = static_cast<int>(std::size(kRandomKindNames));
 
-/// A scene with one view, and its configuration: one camera at the view's origin, with the image size and focal length
-/// of paper_rig().
+/// A scene with one view and one camera at the view's origin, with the image size and focal length of paper_rig().
 struct RandomScene {
   Snapshot town;
   RendererConfig config;
 };
-/// Makes a random scene that depends only on the arguments.
+/// The scene depends only on the arguments.
 RandomScene make_random_scene(RandomKind kind, uint64_t seed);
 
 }  // namespace pictura
