@@ -1,5 +1,5 @@
-// The fixture of tests that need a CUDA device, and helpers that capture CUDA graphs. Without a device, the tests are
-// skipped; if PICTURA_REQUIRE_GPU is 1, they fail instead.
+// The fixture of tests that need a CUDA device, and helpers that capture CUDA graphs. Without a device, tests are
+// skipped, or fail if PICTURA_REQUIRE_GPU is 1.
 #pragma once
 
 #include <cstdlib>
@@ -37,7 +37,7 @@ struct OwnStream {
   OwnStream& operator=(const OwnStream&) = delete;
 };
 
-/// A CUDA graph of the work that `work` enqueues on a stream. The capture rejects every call that allocates or waits.
+/// A CUDA graph of the work that `work` enqueues.
 struct CapturedGraph {
   cudaGraph_t graph = nullptr;
   cudaGraphExec_t executable = nullptr;
@@ -55,8 +55,7 @@ struct CapturedGraph {
   CapturedGraph& operator=(const CapturedGraph&) = delete;
 };
 
-/// While this object exists, allocations and device-wide waits of the calling thread are errors, because a capture is
-/// active and CUDA forbids them during a capture.
+/// Forbids allocations and device-wide waits of the calling thread, by an active capture.
 class ForbidAllocations {
  public:
   ForbidAllocations() {

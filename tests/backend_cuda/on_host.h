@@ -10,7 +10,7 @@
 
 namespace pictura::test {
 
-/// Waits for the device's work, and returns a copy of device memory.
+/// Waits for the device.
 template <typename T>
 std::vector<std::remove_const_t<T>> on_host(Span<T> device) {
   std::vector<std::remove_const_t<T>> host(device.size());
@@ -21,7 +21,6 @@ std::vector<std::remove_const_t<T>> on_host(Span<T> device) {
   return host;
 }
 
-/// Returns whether host memory and device memory contain the same bits.
 template <typename T>
 bool same(Span<T> host, Span<T> device) {
   const auto copy = on_host(device);

@@ -1,4 +1,4 @@
-// Drawing of float images for the tests of backend_gl/.
+// Drawing of float images.
 #pragma once
 
 #include <cstring>
@@ -14,7 +14,7 @@
 
 namespace pictura {
 
-/// Returns the images of all views as floats, in the order of HostImages.
+/// Returns all views' images as floats, in the order of HostImages.
 inline std::vector<float> draw(const std::string& backend, const StaticGeometry& geometry, const SceneOwner& scene,
                                const std::vector<View>& views, const RendererConfig& config) {
   const auto renderer = make_renderer(backend, config);

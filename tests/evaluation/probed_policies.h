@@ -1,5 +1,4 @@
-// Small policies for the tests of probes (experiments that measure how policies respond), and tests that all probes
-// share.
+// Small policies and common tests for probes (experiments on policies' responses).
 #pragma once
 
 #include <initializer_list>
@@ -17,11 +16,10 @@ namespace pictura::test {
 
 constexpr size_t kAgent = 0, kVectorized = 1, kLikeForLike = 2;  // indices in policies_
 
-/// One policy that reads images, and two that read vectors. They are practically untrained: each has learnt from one
-/// update on the town with walls.
+/// One policy that reads images, and two that read vectors, after one update.
 class ProbedPolicies : public ::testing::Test {
  protected:
-  // The first test trains the policies; its name is part of the folder's name.
+  // The first test trains the policies.
   void SetUp() override {
     if (folder_) return;
     folder_ = new ScratchFolder;
@@ -37,7 +35,6 @@ class ProbedPolicies : public ::testing::Test {
     folder_ = nullptr;
   }
 
-  /// Sets options: all three policies, in six scenes of two towns.
   static void ask(ProbeOptions* options) {
     options->policies = policies_;
     options->worlds.maps = {"procedural:1", "procedural:2"};
@@ -66,8 +63,8 @@ inline bool same_bits(const ProbeResults& a, const ProbeResults& b) {
   return true;
 }
 
-/// Tests of one probe. The parameter Kind must define Options, Results, kCases (the number of cases in most tests),
-/// set_cases(cases, &options), probe(options), and is_same(results, results).
+/// Tests of one probe. Kind defines Options, Results, kCases (usual number of cases), set_cases(cases, &options),
+/// probe(options), and is_same(results, results).
 template <typename Kind>
 class ProbeTest : public ProbedPolicies {
  protected:
@@ -100,8 +97,7 @@ class ProbeTest : public ProbedPolicies {
       EXPECT_TRUE(Kind::is_same(probe(o), results())) << batch;
     }
   }
-  /// Checks that different seeds give different results, in cases of one policy in one scene. Returns the results of
-  /// the first seed.
+  /// Checks that seeds change the results of one policy in one scene. Returns the first results.
   static Results expect_seeds_to_decide(int64_t cases) {
     Options o = options(cases);
     o.policies = {policies_[kAgent]};

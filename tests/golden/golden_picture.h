@@ -1,4 +1,4 @@
-// Conversion of a scene's images to one picture and back, and differences between images.
+// Conversion of a scene's images to one picture and back.
 #pragma once
 
 #include <string>
@@ -10,31 +10,30 @@
 
 namespace pictura {
 
-/// Channel values in [0, 1] of all images of a scene: [views x cameras][3 x height x width].
+/// Channel values in [0, 1]: [views x cameras][3 x height x width].
 using Drawing = std::vector<std::vector<float>>;
 
-/// Draws a scene with a renderer on host memory. `format` must be u8 or f32.
+/// `format` must be u8 or f32.
 Drawing draw_scene(Renderer* renderer, const SceneFile& scene, PixelFormat format);
 
-/// Returns the images of the scene by the ray caster (bench/truth/image_truth.h).
+/// Returns the ray caster's images.
 Drawing trace_scene(const SceneFile& scene);
 
-/// Returns a picture with a row for each view and a column for each camera, with grey gaps.
+/// Returns a picture with a row per view and a column per camera, with grey gaps.
 RgbImage to_picture(const SceneFile& scene, const Drawing& drawing);
 
-/// Returns the images of a picture made by to_picture(). Throws Error if its size does not match the scene.
+/// Inverse of to_picture(). Throws Error if the picture's size is wrong.
 Drawing from_picture(const SceneFile& scene, const RgbImage& picture);
 
 /// Returns |a - b| times eight.
 Drawing difference(const Drawing& a, const Drawing& b);
 
-/// Returns the picture enlarged four times, without smoothing.
+/// Enlarges four times, without smoothing.
 RgbImage enlarged(const RgbImage& picture);
 
-/// Returns the error, pooled over all images.
 PooledError error_of(const Drawing& actual, const Drawing& expected);
 
-/// Returns a text that explains why the error exceeds the tolerance; empty if it does not.
+/// Why the error exceeds the tolerance; empty if it does not.
 std::string complaint(const PooledError& error, const ImageTolerance& tolerance);
 
 }  // namespace pictura

@@ -1,4 +1,4 @@
-// Paths and names of golden scenes, for tests that draw all scenes. PICTURA_GOLDEN_DIR is this folder.
+// Paths and names of golden scenes. PICTURA_GOLDEN_DIR is this folder.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace pictura {
 inline std::string scene_path(const std::string& name) { return PICTURA_GOLDEN_DIR "/" + name + ".toml"; }
 inline std::string picture_path(const std::string& name) { return PICTURA_GOLDEN_DIR "/" + name + ".png"; }
 
-/// Returns sorted names of the folder's files with this extension.
+/// Returns sorted names of files with this extension.
 inline std::vector<std::string> golden_names(const std::string& extension) {
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(PICTURA_GOLDEN_DIR)) {

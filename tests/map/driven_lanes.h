@@ -1,4 +1,4 @@
-// Counts the poses at which a car in the middle of a lane touches road edges.
+// Counts the poses at which a car in mid-lane touches road edges.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,6 @@
 
 namespace pictura::test {
 
-/// Road edges in a grid, for spatial queries.
 class EdgeGrid {
  public:
   explicit EdgeGrid(const RoadMap& map) : edges_(map.road_edges) {
@@ -23,8 +22,7 @@ class EdgeGrid {
     grid_ = Grid(boxes, 10.0f);
   }
 
-  /// Whether test(edge) is true for any edge at about the height of p, within a square of half-size radius_m around p.
-  /// Also tests some edges slightly outside the square.
+  /// Whether test(edge) is true for any edge at the height of p, at most about radius_m from p along x and y.
   template <typename Test>
   bool any_near(Vec3 p, float radius_m, Test&& test) const {
     const GridView grid = grid_.view();
@@ -45,8 +43,7 @@ class EdgeGrid {
   Grid grid_;
 };
 
-/// Whether an edge intersects a box on the ground plane. The box is centred on `center` and is 2 * half_length long and
-/// 2 * half_width wide.
+/// Whether an edge intersects a box of 2 * half_length by 2 * half_width on the ground plane.
 inline bool box_intersects(const RoadEdge& edge, Vec3 center, float heading_rad, float half_length, float half_width) {
   const float c = std::cos(heading_rad), s = std::sin(heading_rad);
   auto local = [&](Vec3 p) {
@@ -82,8 +79,7 @@ inline DrivenLanes drive_lanes(const RoadMap& map) {
     for (std::size_t i = 1; i < points.size(); ++i) {
       const LanePoint &a = points[i - 1], &b = points[i];
       for (float u = 0; u < 1; u += 0.5f / (b.s_m - a.s_m)) {
-        // Skips places near which a lane has almost no width, because a car does not fit there. Town06 has five such
-        // lanes, and Town07 has one.
+        // Skips places where a lane has almost no width.
         bool tapers = false;
         for (const LanePoint& near : points) {
           tapers = tapers || (near.width_m < 0.05f && std::abs(near.s_m - a.s_m - u * (b.s_m - a.s_m)) < 30.0f);

@@ -16,7 +16,7 @@ struct OsmMember {
   int ref = 0;
 };
 
-/// Builder of a file. Each element is one line, after two lines of header.
+/// Builder of a file: one line per element, after two lines of header.
 class OsmText {
  public:
   OsmText& node(int id, double x, double y, double z = 0, const std::string& type = "") {
@@ -36,7 +36,7 @@ class OsmText {
     }
     return line(fmt::format(R"(<relation id="{}">{}{}</relation>)", id, references, text_of(tags)));
   }
-  /// Adds a lanelet, with subtype "road" unless `tags` contain a subtype. `rules` are the ids of regulatory elements.
+  /// Adds a lanelet, by default with subtype "road". rules: ids of regulatory elements.
   OsmText& lanelet(int id, int left, int right, TagList tags = {}, const std::vector<int>& rules = {}) {
     std::vector<OsmMember> members{{"way", "left", left}, {"way", "right", right}};
     for (const int rule : rules) members.push_back({"relation", "regulatory_element", rule});

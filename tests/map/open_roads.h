@@ -1,4 +1,4 @@
-// OpenDRIVE files of roads that end, at which traffic leaves and enters the map.
+// OpenDRIVE files of roads that end. Ends of two-way roads are exits and entries.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace pictura::test {
 
-/// A street along x with one lane of 3.5 m in each direction. Each end of the street is both an exit and an entry.
+/// A street along x with a lane of 3.5 m in each direction.
 inline std::string open_street(double length_m = 300) {
   RoadText road;
   road.length = length_m;
@@ -22,7 +22,7 @@ inline std::string open_street(double length_m = 300) {
   return file_of(road.text());
 }
 
-/// A crossing at the origin with four arms of two lanes. Each arm's end is both an exit and an entry.
+/// A crossing at the origin with four arms of two lanes.
 inline std::string open_crossing(double arm_m = 60) {
   constexpr double kArmBegin_m = 12, kQuarter = 1.5707963267948966;
   std::string roads, connections;
@@ -58,7 +58,7 @@ inline std::string open_crossing(double arm_m = 60) {
   return file_of(roads + R"(<junction id="9" name="">)" + connections + "</junction>\n");
 }
 
-/// A one-way road of 250 m along x with two lanes. An on-ramp next to them ends after 100 m.
+/// A one-way road of 250 m along x with two lanes, and an on-ramp that ends after 100 m.
 inline std::string open_ramp() {
   const auto section = [](double s, const std::string& lanes) {
     return fmt::format(
@@ -72,8 +72,7 @@ inline std::string open_ramp() {
   return file_of(road.text());
 }
 
-/// Two straight roads along x, of one lane each. The end of the first is 0.3 m from the begin of the second, but they
-/// are not linked.
+/// Two roads of one lane along x, with a gap of 0.3 m and no link.
 inline std::string unlinked_roads() {
   RoadText first, second;
   first.right = second.right = lane_of(-1, "driving", 3.5);
@@ -82,8 +81,7 @@ inline std::string unlinked_roads() {
   return file_of(first.text() + second.text());
 }
 
-/// Returns the paths of the files in tests/map/cases, sorted by name. Programs that call this function must define
-/// PICTURA_MAP_CASES.
+/// Returns the sorted paths of tests/map/cases. Callers must define PICTURA_MAP_CASES.
 #ifdef PICTURA_MAP_CASES
 inline std::vector<std::string> map_cases() {
   std::vector<std::string> files;

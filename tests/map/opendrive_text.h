@@ -1,5 +1,4 @@
-// Evaluation of OpenDRIVE text for tests: of lines, arcs, widths and elevations, and of simple rules of the standard.
-// It shares no code with the writer or the importer.
+// Evaluation of OpenDRIVE text, independent of the writer and the importer.
 #pragma once
 
 #include <string>
@@ -26,29 +25,27 @@ class OpenDriveText {
   std::unordered_map<std::string, pugi::xml_node> roads_;
 };
 
-/// Returns the rules of OpenDRIVE 1.4 that the text violates. It checks that required attributes exist, stations
-/// ascend, lane ids count from the centre, ids are unique, links have targets and are mutual, and junction connections
-/// agree with their roads.
+/// Returns the violated rules of OpenDRIVE 1.4: required attributes, ascending stations, lane ids counted from the
+/// centre, unique ids, mutual links, and connections that agree with their roads.
 std::vector<std::string> violated_rules(const OpenDriveText& text);
 
 struct Pose {
   double x = 0, y = 0, heading = 0;
 };
 
-/// Returns the pose on a line or an arc, ds metres from its start.
+/// Returns the pose ds metres from the start of a line or an arc.
 Pose on_geometry(const pugi::xml_node& geometry, double ds);
 
-/// End of a lane at an end of its road: positions of the inner and outer border, heading of +s, height, and grade along
-/// +s.
+/// End of a lane: inner and outer border, heading of +s, height, and grade along +s.
 struct LaneEnd {
   double inner_x = 0, inner_y = 0, outer_x = 0, outer_y = 0, heading = 0, z = 0, grade = 0;
 };
 LaneEnd lane_end(const pugi::xml_node& road, int lane, bool at_start);
 
-/// Returns the lane with this id in the first or last section of a road; an empty node if there is none.
+/// Returns a lane of the first or last section; an empty node if there is none.
 pugi::xml_node lane_at(const pugi::xml_node& road, int lane, bool at_start);
 
-/// Returns all lanes of a section, from left to right, without the centre lane.
+/// Returns a section's lanes from left to right, without the centre lane.
 std::vector<pugi::xml_node> lanes_of(const pugi::xml_node& section);
 
 inline bool is(const pugi::xml_node& node, const char* attribute, const char* value) {

@@ -14,7 +14,6 @@
 
 namespace pictura::test {
 
-/// A file with the given contents of <OpenDRIVE>.
 inline std::string file_of(const std::string& contents) {
   return "<?xml version=\"1.0\"?>\n<OpenDRIVE>\n<header revMajor=\"1\" revMinor=\"4\"/>\n" + contents +
          "</OpenDRIVE>\n";
@@ -26,7 +25,7 @@ inline std::string line_at(double s, double x, double y, double heading, double 
                      s, x, y, heading, length);
 }
 
-/// A lane with a constant width; `more` is inserted into the <lane> element.
+/// A lane of constant width. more: further contents of the <lane> element.
 inline std::string lane_of(int id, const std::string& type, double width, const std::string& more = "") {
   return fmt::format(R"(<lane id="{}" type="{}">{}<width sOffset="0" a="{}" b="0" c="0" d="0"/></lane>)"
                      "\n",
@@ -67,8 +66,7 @@ struct RoadText {
   }
 };
 
-/// Three roads along x: road 1 from 0 to 100 m, road 2 in junction 7 from 100 to 120 m, and road 3 from 120 m on. Only
-/// road 1 has a speed limit.
+/// Three roads along x: road 1 (with a speed limit) ends at 100 m, road 2 (in junction 7) at 120 m; road 3 follows.
 inline std::string three_roads(const std::string& rest_of_2 = "", const std::string& junction_more = "",
                                const std::string& rest_of_1 = "") {
   RoadText a, b, c;
@@ -95,8 +93,8 @@ inline std::string three_roads(const std::string& rest_of_2 = "", const std::str
          junction_more + "</junction>\n";
 }
 
-/// A ring of 40 m radius around the origin: two half circles with one lane each. If `road_3` is not empty, it is the
-/// text of road 3, which is linked between the second and the first half circle.
+/// A ring of 40 m radius around the origin: two half circles of one lane. road_3: text of a road that links the second
+/// to the first half circle.
 inline std::string ring_with(const std::string& road_3 = "", const std::function<void(RoadText*)>& change = {}) {
   RoadText half;
   half.length = 40 * std::numbers::pi;
@@ -120,14 +118,13 @@ inline std::string ring_with(const std::string& road_3 = "", const std::function
   return first.text() + second.text() + road_3;
 }
 
-/// Returns the text with the first occurrence of `from` replaced by `to`.
+/// Replaces the first occurrence of `from` by `to`.
 inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   if (at == std::string::npos) throw std::runtime_error("nothing to replace: " + from);
   return text.replace(at, from.size(), to);
 }
 
-/// Returns the map of a file with the given contents of <OpenDRIVE>.
 inline RoadMap parse(const std::string& contents) { return parse_opendrive(file_of(contents), "small.xodr"); }
 
 inline const Lane& lane_named(const RoadMap& map, const std::string& road, int section, int lane) {
@@ -147,7 +144,6 @@ inline std::vector<int32_t> list(const RoadMap& map, IndexRange range) {
   return {links.begin(), links.end()};
 }
 
-/// Checks the coordinates of a point in the map's file.
 inline void expect_at(const RoadMap& map, Vec3 p, double x, double y, double z = 0) {
   EXPECT_NEAR(p.x + map.origin_m[0], x, 1e-4);
   EXPECT_NEAR(p.y + map.origin_m[1], y, 1e-4);

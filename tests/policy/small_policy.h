@@ -1,12 +1,11 @@
-// Configurations of policies that are small enough for hundreds of passes.
+// Policies that are small enough for hundreds of passes.
 #pragma once
 
 #include "pictura/configuration/config.h"
 
 namespace pictura::test {
 
-/// A policy of either modality (images or vectors), whose layers have different widths. Its images are small, with
-/// patches of one pixel.
+/// A policy whose layers have different widths, with patches of one pixel.
 inline PolicySection tiny_section(Modality modality) {
   PolicySection c;
   c.modality = modality;
@@ -23,7 +22,7 @@ inline PolicySection tiny_section(Modality modality) {
   return c;
 }
 
-/// A vector policy that learns the task of corridor.h.
+/// A policy for the task of corridor.h.
 inline PolicySection learning_section() {
   PolicySection c = tiny_section(Modality::vector);
   c.embedding_width = 8;

@@ -1,4 +1,4 @@
-// CPU simulators for tests, and functions that step them.
+// CPU simulators for tests.
 #pragma once
 
 #include <memory>

@@ -1,6 +1,5 @@
-// A second implementation of the observation, written from docs/reference/observation.md. It computes each number in
-// double precision, from all boxes, lines and pieces of a world. It shares no code with the simulator's rules. The CPU
-// and CUDA simulators share the rules, so a comparison of the simulators cannot reveal a fault in the rules.
+// A second implementation of the observation, from docs/reference/observation.md, in double precision. It shares no
+// code with the simulator's rules, so that it reveals their faults.
 #pragma once
 
 #include <array>
@@ -10,8 +9,7 @@
 
 namespace pictura::testing {
 
-/// A candidate for a row of an entity set. inside_m is how far the entity is inside the set's range; it is negative
-/// outside the range.
+/// A candidate for a row of an entity set. inside_m: distance from the set's range; negative outside.
 struct ReferenceRow {
   double distance_m = 0, inside_m = 0;
   std::vector<double> features;
@@ -24,8 +22,7 @@ struct ReferenceObservation {
   bool is_within_cells = false;  // if false, some of these rows may be missing
 };
 
-/// Returns the observation of a slot's agent in the current state, which must be on the host. Ignores the agent's
-/// status.
+/// Returns the observation of a slot's agent, whatever its status. The state must be on the host.
 ReferenceObservation reference_observation(Simulator& simulator, int slot);
 
 }  // namespace pictura::testing

@@ -1,4 +1,4 @@
-// Random edits of a simulator's agents: moves of a few metres, moves onto other agents, speeds, goals and status.
+// Random edits of agents: moves, also onto other agents, speeds, goals and status.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,7 @@
 
 namespace pictura::testing {
 
-/// Random edit of about a third of the agents of a state on the host. `number` selects the random numbers. All parts of
-/// the edit are valid.
+/// Random, valid edit of about a third of the agents of a state on the host. number: selects the random numbers.
 class RandomEdit {
  public:
   RandomEdit(const AgentStateView& state, int num_slots, uint32_t number) {

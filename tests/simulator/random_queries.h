@@ -1,4 +1,4 @@
-// Random observation queries, and memory for their answers that is filled with unlikely values.
+// Random observation queries, and memory for their answers.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +11,8 @@
 
 namespace pictura::testing {
 
-/// Random queries with their lists, for a simulator on the host; `number` selects the random numbers. Each query is for
-/// a random slot, hides up to half of the boxes of the slot's world, and inserts up to three boxes nearby.
+/// Random queries, for a simulator on the host. number: selects the random numbers. A query hides up to half of its
+/// world's boxes, and inserts up to three boxes.
 struct RandomQueries {
   RandomQueries(Simulator* simulator, int count, uint32_t number) {
     const SceneBatch& scene = simulator->scene();
@@ -50,7 +50,6 @@ struct RandomQueries {
   std::vector<InsertedBox> inserted;
 };
 
-/// Arrays of a caller for `count` observations.
 class AnswerMemory {
  public:
   AnswerMemory(size_t count, const SimulatorConfig& config)
@@ -67,7 +66,6 @@ class AnswerMemory {
   HostResults memory_;
 };
 
-/// Returns one observation of an array of observations.
 inline ObservationView observation_of(const ObservationView& all, size_t row) {
   ObservationView one;
 #define X(name, type, rows, features, part, comment) \

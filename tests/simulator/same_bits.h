@@ -1,4 +1,4 @@
-// Bitwise comparison of the results of simulators, and actions for driving simulators.
+// Bitwise comparison of results, and actions for driving.
 #pragma once
 
 #include <cstring>
@@ -17,7 +17,7 @@ bool same_bits(Span<T> a, Span<T> b) {
   return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
 }
 
-/// Returns the array, the element and the values of the first difference; empty if all bits are equal.
+/// Returns the first difference; empty if all bits are equal.
 inline std::string first_difference(const ObservationView& a, const ObservationView& b) {
 #define X(name, type, rows, features, part, comment)                                                             \
   if (!same_bits(a.name, b.name)) {                                                                              \
@@ -32,8 +32,7 @@ inline std::string first_difference(const ObservationView& a, const ObservationV
   return "";
 }
 
-/// Returns actions that keep most agents driving: usually no jerk, sometimes a random action. Slot and step are the key
-/// of the random numbers.
+/// Returns actions that keep most agents driving: usually no jerk, sometimes random.
 inline std::vector<int32_t> mixed_actions(int num_slots, uint32_t step) {
   constexpr int32_t kCoasting = 2 * kNumLatActions + 1;
   std::vector<int32_t> actions;
@@ -60,8 +59,8 @@ inline std::vector<int32_t> straight_actions(const AgentStateView& state, int nu
   return actions;
 }
 
-/// Returns mixed_actions() as commands. Some commands instead move an agent a little forward and sideways or onto
-/// another agent, or remove it. The state must be on the host.
+/// Returns mixed_actions() as commands, some of which instead move an agent a little or onto another agent, or remove
+/// it. The state must be on the host.
 inline std::vector<Command> mixed_commands(const AgentStateView& state, int num_slots, uint32_t step) {
   const std::vector<int32_t> actions = mixed_actions(num_slots, step);
   std::vector<Command> commands(actions.size());

@@ -1,4 +1,4 @@
-// Access to error messages, for tests that check them.
+// Access to error messages.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@ namespace pictura::test {
 /// Result of message_of() if nothing is thrown.
 constexpr const char* kNoError = "no error";
 
-/// Returns the message of the error of type Expected that `work` throws.
+/// Returns the message of the Expected error that `work` throws.
 template <typename Expected = Error, typename Work>
 std::string message_of(Work&& work) {
   try {

@@ -1,4 +1,4 @@
-// Small scenes drawn by the CPU renderer, for tests that check pixels.
+// Small scenes drawn by the CPU renderer.
 #pragma once
 
 #include <cstring>

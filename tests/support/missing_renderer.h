@@ -1,4 +1,4 @@
-// Skips tests on machines that lack a renderer's library.
+// Skips tests without a renderer's library.
 #pragma once
 
 #include <cstdlib>
@@ -11,8 +11,7 @@
 
 namespace pictura {
 
-/// Returns why a renderer cannot run on this machine; empty if it can. If it cannot and PICTURA_REQUIRE_GL names the
-/// renderer, the test fails.
+/// Returns why a renderer cannot run here; empty if it can. The test fails if PICTURA_REQUIRE_GL names the renderer.
 inline std::string missing(const std::string& backend) {
   try {
     make_renderer(backend, {});

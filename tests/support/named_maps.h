@@ -1,4 +1,4 @@
-// Functions for tests that are parameterized by map name: whether the map exists, and the test's name.
+// Functions for tests that are parameterized by map name.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace pictura::test {
 
-/// Returns a message that names the missing map file; empty if the map exists.
+/// Returns a message if the map file is missing; empty otherwise.
 inline std::string missing(const std::string& map) {
   const std::vector<std::string> towns = known_towns();
   const std::string town(parse_map_copy(map).map);
@@ -20,7 +20,6 @@ inline std::string missing(const std::string& map) {
   return is_present ? "" : "needs " + town + ".xodr; set PICTURA_DATA";
 }
 
-/// Returns the name of a test for its map.
 inline std::string map_name(const ::testing::TestParamInfo<const char*>& map) {
   std::string name = map.param;
   for (const char mark : {':', '#'}) std::replace(name.begin(), name.end(), mark, '_');

@@ -1,5 +1,4 @@
-// Checks of the guarantees that all renderers give to callers with host memory. Tests of the backends call these
-// functions.
+// Checks of the guarantees of all renderers, for callers with host memory.
 #pragma once
 
 #include <algorithm>
@@ -20,10 +19,9 @@
 
 namespace pictura::test {
 
-/// Function that makes a renderer of one kind with the given rig.
 using MakeForRig = std::function<std::unique_ptr<Renderer>(const Rig& rig)>;
 
-/// Returns the bytes of a town's images. The town's map must be uploaded to the handle that the scene's world names.
+/// Returns the bytes of a town's images. The map must be at the handle of the scene's world.
 inline std::vector<uint8_t> draw_town(Renderer* renderer, const SceneOwner& scene, const std::vector<View>& views) {
   HostImages images(renderer->config().rig, static_cast<int>(views.size()));
   std::ranges::fill(images.bytes(), uint8_t{0xA5});
@@ -32,8 +30,7 @@ inline std::vector<uint8_t> draw_town(Renderer* renderer, const SceneOwner& scen
   return {images.bytes().begin(), images.bytes().end()};
 }
 
-/// Expects that callers can choose handles, that maps can be replaced and released by handle, and that renderers can
-/// share a scene.
+/// Expects that maps can be replaced and released by handle, and that renderers can share a scene.
 inline void expect_maps_by_handle(const MakeForRig& make) {
   const Rig rig = front_rig(32, 18);
   Snapshot town = make_synthetic_town(1, 20);
@@ -51,21 +48,18 @@ inline void expect_maps_by_handle(const MakeForRig& make) {
   const std::vector<uint8_t> expected_other = draw_town(only_other.get(), named(3), town.views);
   ASSERT_NE(expected, expected_other);
 
-  // Uploads to handles that are far apart, in descending order.
   constexpr GeometryHandle kLast = kNumGeometryHandles - 1;
   second->upload(kLast, other.geometry);
   second->upload(7, town.geometry);
   EXPECT_EQ(draw_town(second.get(), named(7), town.views), expected);
   EXPECT_EQ(draw_town(second.get(), named(kLast), town.views), expected_other);
-  // One scene serves several renderers.
   first->upload(7, town.geometry);
   const SceneOwner shared = named(7);
   EXPECT_EQ(draw_town(first.get(), shared, town.views), draw_town(second.get(), shared, town.views));
-  // Replaces a map.
   second->upload(7, other.geometry);
   EXPECT_EQ(draw_town(second.get(), shared, town.views), expected_other);
   EXPECT_EQ(draw_town(first.get(), shared, town.views), expected);
-  // Releases a map, twice. Other maps are unchanged.
+  // Releases a map twice. Other maps are unchanged.
   second->release(7);
   second->release(7);
   for (const GeometryHandle empty : {7, 8, kNumGeometryHandles, -1}) {
@@ -78,7 +72,7 @@ inline void expect_maps_by_handle(const MakeForRig& make) {
   EXPECT_EQ(draw_town(second.get(), shared, town.views), expected);
 }
 
-/// Expects an error that names the handle for each handle out of range.
+/// Expects an error naming the handle for each handle out of range.
 inline void expect_refused_handles(const MakeForRig& make) {
   const auto renderer = make(front_rig(8, 8));
   const StaticGeometry geometry = make_synthetic_town(1, 1).geometry;
@@ -89,7 +83,7 @@ inline void expect_refused_handles(const MakeForRig& make) {
   }
 }
 
-/// Converts planar images to the patches of `layout`, and returns the bytes. Patches are black beyond the images.
+/// Converts planar images to patches, which are black beyond the images.
 inline std::vector<uint8_t> as_patches(const HostImages& planar, const ImageLayout& layout) {
   const std::size_t size = bytes_per_value(layout.format);
   std::vector<uint8_t> result(layout.bytes());
@@ -113,8 +107,8 @@ inline std::vector<uint8_t> as_patches(const HostImages& planar, const ImageLayo
   return result;
 }
 
-/// Expects that images in patches of any size contain the values of planar images, and black beyond the image. Also
-/// expects that bf16 images contain the values of u8 images.
+/// Expects that patches contain the values of planar images, and black beyond, and that bf16 images contain the values
+/// of u8 images.
 inline void expect_patches(const MakeForRig& make) {
   Rig rig = paper_rig(33, 19);  // neither side is a multiple of a patch's side
   rig.cameras[1] = paper_rig(32, 18).cameras[1];
@@ -148,8 +142,7 @@ inline void expect_patches(const MakeForRig& make) {
   }
 }
 
-/// Expects an error that names the order, the patch size or the format, for each request that the renderer does not
-/// support.
+/// Expects an error naming the order, the patch size or the format of each unsupported request.
 inline void expect_refused_order(const MakeForRig& make) {
   const Rig rig = front_rig(8, 8);
   HostImages images(rig, 1);
@@ -174,8 +167,7 @@ inline void expect_refused_order(const MakeForRig& make) {
               testing::HasSubstr("images: expected the format u8 or f32, got bf16"));
 }
 
-/// Expects that drawing the first `count` views of a list gives the images of exactly those views. Images of later
-/// views must not be written, and later views must not be read.
+/// Expects that drawing the first `count` views neither writes nor reads later views.
 inline void expect_counted_views(const MakeForRig& make) {
   const Rig rig = paper_rig(24, 14);
   Snapshot town = make_synthetic_town(1, 20);
@@ -208,7 +200,7 @@ inline void expect_counted_views(const MakeForRig& make) {
   }
 }
 
-/// Expects that visibility queries also respect the number of views: the answer for a later view is NaN.
+/// Expects that the visibility of later views is NaN.
 inline void expect_counted_queries(const MakeForRig& make) {
   Snapshot town = make_synthetic_town(1, 20);
   town.views.resize(2);

@@ -1,4 +1,4 @@
-// A temporary folder for the files of one test, and environment variables that a test sets.
+// A temporary folder, and environment variables that a test sets.
 #pragma once
 
 #include <cstdlib>
@@ -12,8 +12,7 @@
 
 namespace pictura::test {
 
-/// A new, empty folder, which the destructor removes with its contents. Its name contains the test and the process,
-/// because ctest runs tests in parallel.
+/// A new folder, which the destructor removes. Its name contains the test and the process, for parallel tests.
 class ScratchFolder {
  public:
   ScratchFolder() {
@@ -34,7 +33,6 @@ class ScratchFolder {
 
   std::string path() const { return path_.string(); }
   std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-  /// Returns the number of files and folders in the folder.
   size_t num_entries() const {
     return static_cast<size_t>(
         std::distance(std::filesystem::directory_iterator(path_), std::filesystem::directory_iterator()));

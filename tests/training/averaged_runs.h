@@ -1,4 +1,4 @@
-// Checks that compare training runs that average their weights with an average computed by hand, on any device.
+// Checks of reproducible training runs that average their weights.
 #pragma once
 
 #include <algorithm>
@@ -18,9 +18,8 @@ inline bool are_equal(const std::vector<NamedTensor>& a, const std::vector<Named
   });
 }
 
-/// Makes two runs of four updates: one with an average, in folder/with, and one without, in folder/without. Checks that
-/// the first averages the weights after each update, and that both learn the same policy. Both runs must be
-/// reproducible. Returns their reports.
+/// Makes two runs of four updates: folder/with, which averages the weights, and folder/without. Checks the average
+/// after each update, and that both learn the same policy. Returns their reports.
 inline std::array<TrainReport, 2> check_average_by_hand(const std::string& folder, const std::string& device) {
   const std::vector<std::string> reproducible{"train.reproducible=true", "train.checkpoint_every=1",
                                               "train.keep_checkpoints=9"};
@@ -55,7 +54,7 @@ inline std::array<TrainReport, 2> check_average_by_hand(const std::string& folde
   return {without, with};
 }
 
-/// Checks that a resumed run has the same average as an uninterrupted run. Both runs must be reproducible.
+/// Checks that a resumed run has the average of an uninterrupted run.
 inline void check_average_resumes_exactly(const std::string& folder, const std::string& device) {
   const auto run = [&](const std::string& name, int updates, OldRun old_run) {
     TrainOptions o =

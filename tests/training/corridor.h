@@ -1,4 +1,4 @@
-// A task for PPO that a tiny vector policy learns in one or two seconds.
+// A task that a tiny vector policy learns in seconds.
 #pragma once
 
 #include "pictura/backends/make_learner.h"
@@ -9,9 +9,8 @@
 
 namespace pictura::test {
 
-// Task without a simulator. The agent observes a sign (1 or -1) in its ego vector. The action kGo has no immediate
-// reward, but in the next step, the right action for the sign is rewarded. So the policy must assign credit over one
-// step.
+// Task without a simulator. The ego vector shows a sign (1 or -1). The action kGo has no immediate reward, but in the
+// next step, the right action for the sign is rewarded.
 struct Corridor {
   static constexpr int64_t kSlots = 128, kSteps = 8;
   static constexpr int kGo = 7;
@@ -20,7 +19,7 @@ struct Corridor {
   at::Tensor open = at::zeros({kSlots}, at::kFloat), sign = at::ones({kSlots}, at::kFloat);
 
   const std::unique_ptr<LearnerExecutor> executor = make_learner_executor(Device{});
-  const uint64_t seed;  // seed of actions, signs and the order of transitions
+  const uint64_t seed;
 
   explicit Corridor(uint64_t its_seed = 9)
       : rollout(RolloutObservations(storage()), kSteps, kSlots, Device{}), seed(its_seed) {}

@@ -1,5 +1,5 @@
-// A policy without matrix products, whose arithmetic is exact on every device. With it, the other parts of training can
-// be compared bit for bit. Also runs of three updates with this policy, and their records.
+// A policy whose arithmetic is exact on every device, so that other parts of training can be compared bit for bit. Also
+// records of its runs.
 #pragma once
 
 #include <ATen/ATen.h>
@@ -13,9 +13,8 @@
 
 namespace pictura::test {
 
-/// Reads every bit of the observed arrays and images. It sums them as integers, so that the sum does not depend on the
-/// order. The sum selects the value, and the 1, 2, 4 or 8 actions that are possible with equal probability. Agents with
-/// some conditioning values instead always drive straight ahead, so that they make progress.
+/// Sums every bit of the observation as integers. The sum selects the value, and the 1, 2, 4 or 8 equally probable
+/// actions. Agents with some conditioning values always drive straight ahead, so that they make progress.
 class ExactPolicy final : public Policy {
  public:
   explicit ExactPolicy(Device device) {
@@ -47,7 +46,6 @@ class ExactPolicy final : public Policy {
     return {logits + shift, value + shift};
   }
 
-  /// Takes a step that every device computes identically.
   void step() {
     const at::NoGradGuard no_grad;
     parameters_[0].value += 0.25;
@@ -79,9 +77,8 @@ class ExactPolicy final : public Policy {
 /// Records of three updates, in host memory.
 struct ExactRun {
   struct Update {
-    // Tensors of the Rollout.
     std::vector<NamedTensor> rollout;
-    std::vector<at::Tensor> images;  // images of some active agents
+    std::vector<at::Tensor> images;  // images of some agents
     std::vector<at::Tensor> learnt;  // see ExactPolicy::take_learnt()
     double kept_fraction = 0, adv_threshold = 0;
   };
@@ -91,8 +88,7 @@ struct ExactRun {
   int64_t graph_launches = 0;
 };
 
-/// Returns a configuration with a seed that produces every event that exact_test.cpp requires. Minibatches have the
-/// size of chunks.
+/// Returns a configuration whose seed produces every event that exact_test.cpp requires.
 inline Config exact_config(const std::string& device, const std::vector<std::string>& more) {
   std::vector<std::string> overrides{"run.device=" + device,
                                      device == "cpu" ? "render.backend=cpu" : "render.backend=auto",
@@ -160,7 +156,6 @@ inline ExactRun run_exactly(const Config& config) {
   return result;
 }
 
-/// Checks that the observations, actions and results of two runs are bitwise identical.
 inline void expect_same_driving(const ExactRun& a, const ExactRun& b) {
   ASSERT_EQ(a.updates.size(), b.updates.size());
   for (size_t u = 0; u < a.updates.size(); ++u) {
@@ -177,8 +172,7 @@ inline void expect_same_driving(const ExactRun& a, const ExactRun& b) {
   EXPECT_EQ(a.simulator_hash, b.simulator_hash);
 }
 
-/// Checks that two runs learnt from the same transitions in the same order. A longer chunk of one run is padded with
-/// its first row.
+/// Checks that two runs learnt from the same transitions in the same order. Longer chunks are padded.
 inline void expect_same_order(const ExactRun& a, const ExactRun& b) {
   for (size_t u = 0; u < a.updates.size(); ++u) {
     SCOPED_TRACE("update " + std::to_string(u + 1));

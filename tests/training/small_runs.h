@@ -1,4 +1,4 @@
-// Training runs of a few vehicles on the procedural town, and readers of the files that they write.
+// Training runs of a few vehicles on the procedural town.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace pictura::test {
 
-/// Options of a run of four updates of a reduced configs/smoke.toml. `device` is the value of run.device.
+/// Options of four updates of a reduced configs/smoke.toml. device: value of run.device.
 inline TrainOptions small_run(const std::string& out_folder, const std::string& device,
                               const std::vector<std::string>& more = {}) {
   TrainOptions o;
@@ -33,8 +33,8 @@ inline TrainOptions small_run(const std::string& out_folder, const std::string& 
   return o;
 }
 
-/// Makes three runs of two updates: a run, its repetition, and a run that is resumed after the first update. Returns
-/// the hashes of their policies.
+/// Makes a run of two updates, its repetition, and a run resumed after the first update. Returns their policies'
+/// hashes.
 inline std::array<std::string, 3> policies_of_equal_runs(const std::string& folder, const std::string& device,
                                                          std::vector<std::string> more) {
   more.push_back("train.updates=2");
@@ -48,7 +48,6 @@ inline std::array<std::string, 3> policies_of_equal_runs(const std::string& fold
   return {whole, again, train(parts).policy_hash};
 }
 
-/// Options of one short evaluation on the procedural town.
 inline EvaluateOptions one_scenario(const std::string& checkpoint, int steps) {
   EvaluateOptions o;
   o.device = "cpu";
@@ -60,7 +59,7 @@ inline EvaluateOptions one_scenario(const std::string& checkpoint, int steps) {
   return o;
 }
 
-/// Returns the cells of a progress.csv; the first row is the header.
+/// Returns the cells of a progress.csv, header first.
 inline std::vector<std::vector<std::string>> read_table(const std::string& path) {
   std::vector<std::vector<std::string>> rows;
   std::istringstream lines(read_file(path));

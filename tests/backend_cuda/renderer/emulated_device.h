@@ -1,7 +1,6 @@
-// Emulates a CUDA device on the host, to run the source of kernels without a GPU. It provides the parts of CUDA that
-// kernels use, and blocks whose threads are fibers. Warps, and the threads of a warp, run in a random order given by a
-// seed. Each thread runs up to its next collective operation. If lanes of a warp wait for different operations, that is
-// an error. Races between two collective operations are not detected. Only one source file may include this header,
+// Emulates a CUDA device on the host, to run kernels without a GPU. Threads of a block are fibers. Warps and threads
+// run in a random order, each up to its next collective operation. It is an error if lanes of a warp wait for different
+// operations. Races between two collective operations are not detected. Only one source file may include this header,
 // before the kernels.
 #pragma once
 
@@ -28,13 +27,12 @@ struct Dim {
 };
 inline Dim thread_index, block_index, block_dim, grid_dim;
 
-/// Runs one block at a time.
 class Block {
  public:
   enum class Step { none, warp, block, done };
   static constexpr int kLanes = 32;
 
-  /// Calls kernel() in each of `threads` threads. The number must be a multiple of the warp size.
+  /// Calls kernel() in each of `threads` threads, a multiple of the warp size.
   static void run(int threads, uint64_t seed, const std::function<void()>& kernel) {
     Block block(threads, seed, kernel);
     current() = &block;
@@ -46,8 +44,7 @@ class Block {
     return block;
   }
 
-  /// Waits for all lanes of the warp and returns their values. `what` names the operation and must be the same in all
-  /// lanes.
+  /// Waits for the warp's lanes and returns their values. what: name of the operation, equal in all lanes.
   const uint64_t* exchange(const char* what, uint64_t value) {
     Thread& thread = threads_[running_];
     thread.what = what;
@@ -105,7 +102,6 @@ class Block {
     return std::all_of(threads_.begin(), threads_.end(), [&](const Thread& t) { return t.waits_for == step; });
   }
 
-  // Runs the lanes of a warp up to their next collective operation.
   void run_warp(std::size_t warp) {
     std::size_t order[kLanes];
     for (std::size_t lane = 0; lane < kLanes; ++lane) order[lane] = warp * kLanes + lane;

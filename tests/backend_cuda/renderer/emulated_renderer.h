@@ -1,4 +1,4 @@
-// A renderer that runs the source of the CUDA renderer's kernels on the host, thread by thread.
+// A renderer that runs the CUDA renderer's kernels on the host, in a random order of threads.
 #pragma once
 
 #include <memory>
@@ -9,8 +9,7 @@
 
 namespace pictura::test {
 
-/// Draws with the emulated kernels. Each launch has only two blocks, so that each block draws several images. The order
-/// of threads is random and depends on a seed.
+/// Launches have only two blocks, so that each block draws several images.
 class EmulatedRenderer final : public Renderer {
  public:
   /// Capacity of the pool per image.
@@ -28,12 +27,11 @@ class EmulatedRenderer final : public Renderer {
   void render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out, Stream stream) override;
   void visibility(const SceneBatch& scene, const ViewBatch& views, Span<const VisibilityQuery> queries,
                   Span<float> visibility_out, Stream stream) override;
-  /// Throws the fault of the last call, if any.
+  /// Throws the last call's fault.
   void poll() override;
   void check(Stream stream = {}) override;
 
-  /// Numbers of images of the last call: images that were left to the last launch (overflow), and images that did not
-  /// fit into the pool (deferred).
+  /// Numbers of overflow images and deferred images of the last call.
   int overflow() const { return overflow_; }
   int deferred() const { return deferred_; }
 
@@ -48,7 +46,7 @@ class EmulatedRenderer final : public Renderer {
   uint64_t seed_;
   Pool pool_;
   std::vector<PinholeCamera> cameras_;
-  std::vector<std::unique_ptr<Map>> maps_;        // [handle]; null for a handle without a map
+  std::vector<std::unique_ptr<Map>> maps_;        // [handle]; null: no map
   std::vector<cuda::DeviceGeometry> geometries_;  // [handle]
   cuda::FaultWord fault_ = cuda::kNoFault;
   int overflow_ = 0, deferred_ = 0;

@@ -1,6 +1,5 @@
-// Comparison of kernels with the oracle (the CPU renderer). Kernels follow the rules and the arithmetic of the oracle,
-// and they sum integers. So tests require exactly the oracle's bits, and not only the tolerance of other backends. It
-// follows that images do not depend on the order of threads.
+// Comparison of kernels with the oracle (the CPU renderer). Results are bitwise identical, because kernels use its
+// rules and sum integers.
 #pragma once
 
 #include <cmath>
@@ -19,8 +18,7 @@ inline void expect_equal(const Outputs& actual, const Outputs& oracle) {
   EXPECT_TRUE(actual == oracle) << "colours or planes differ";
 }
 
-/// Compares the visibility of each agent of a world in all views. If the oracle's answer is NaN, `actual` must answer
-/// NaN.
+/// Compares each agent's visibility in all views. NaN equals only NaN.
 inline void expect_equal_visibility(Renderer* actual, Renderer* oracle, const Snapshot& town) {
   std::vector<VisibilityQuery> queries;
   for (std::size_t view = 0; view < town.views.size(); ++view) {

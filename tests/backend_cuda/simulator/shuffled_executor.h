@@ -1,6 +1,5 @@
-// Runs the phases of the CUDA simulator on the host. Every loop over threads runs in a random order, because a device
-// may choose any order and results must not depend on it. Threads that interleave within one phase, and warps of more
-// than one lane, are not tested.
+// Runs the phases of the CUDA simulator on the host, with threads in a random order. Threads that interleave within a
+// phase, and warps of several lanes, are not tested.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +21,7 @@ struct HostAtomics {
   void lower(int32_t* value, int32_t bound) const { *value = std::min(*value, bound); }
 };
 
-/// Calls body(i) for all i in [0, count), in a random order.
+/// Calls body(i) for i in [0, count), in a random order.
 template <typename Body>
 void shuffled(std::mt19937* random, int count, const Body& body) {
   std::vector<int> order(static_cast<size_t>(count));
@@ -98,7 +97,7 @@ struct ShuffledLaunch {
   }
 };
 
-/// Steps worlds with the phases of the CUDA simulator, from episode 0.
+/// Steps worlds from episode 0.
 class ShuffledExecutor {
  public:
   ShuffledExecutor(const SimulatorConfig& config, const std::vector<std::shared_ptr<const RoadMap>>& maps,

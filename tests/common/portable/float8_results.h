@@ -1,5 +1,4 @@
-// Results of the operations on Float8. Float8 has two forms, in a register and in memory; the compiler options of the
-// including file select the form.
+// Results of the operations on Float8, in a register or in memory, as the including file's compiler options select.
 #pragma once
 
 #include <cstring>
@@ -62,7 +61,7 @@ std::vector<uint32_t> results_of(const Float8Inputs& in) {
   for (const Float8& of : of_indices) add(of);
   for (const Float8& of : of_fours) add(of);
 
-  // Elements after the chosen elements are unspecified.
+  // Elements after the chosen are unspecified.
   int32_t stored[8], chosen[8], numbers[8];
   const int num_chosen = __builtin_popcount(in.mask);
   store8_integers(a, stored);
