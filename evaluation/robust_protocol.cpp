@@ -109,7 +109,7 @@ RobustReport evaluate_robust(const RobustOptions& options) {
   evaluation.scenarios = options.scenarios;
   evaluation.steps = kRobustSteps;
   evaluation.light_cycles = LightCycles::independent;
-  evaluation.light_heads = LightHeads::as_mapped;
+  evaluation.light_heads = LightHeads::visible;  // cameras at the stop line must see them
   evaluation.densities = {Density::light};  // agents_per_world replaces its number of agents
   for (RobustRow& row : report.rows) {
     if (!applies(row)) continue;

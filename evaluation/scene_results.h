@@ -48,7 +48,7 @@ struct SceneResults {
   std::vector<std::string> unread;
   int first_scene = 0, num_scenes = 0;
   int without_drivers = 0;                       // excluded: all road users are parked or absent
-  int repaired_headings = 0;                     // of scored scenes, by SceneProtocol::max_first_turn_deg
+  int repaired_headings = 0;                     // in scored scenes; SceneProtocol::max_first_turn_deg
   std::vector<std::string> faults;               // excluded scenes that cannot be read or simulated
   std::vector<std::vector<SceneCounts>> counts;  // [densities][scored scenes]
 

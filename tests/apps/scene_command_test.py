@@ -140,6 +140,10 @@ with tempfile.TemporaryDirectory() as name:
         assert "warning: left out: " in done.stderr and "damaged.tfrecord: record 0" in done.stderr, done.stderr
         assert (report["scenes"], report["scored"], report["without_drivers"]) == (6, 5, 0), report
         assert len(report["faults"]) == 1 and report["rules"]["overlapping"] == "replay"
+        assert report["repaired_headings"] == 0, report
+        repairs = (*words, "--density", "100", "--steps", 1, "--rule", "max_first_turn_deg=0.0001")
+        repaired = json.loads(run(*repairs, "--json", command="evaluate").stdout)["repaired_headings"]
+        assert repaired > 0 and f"{repaired} first headings repaired" in run(*repairs, command="evaluate").stdout
         assert [row["density"] for row in report["rows"]] == [1, 0.75, 0.5]
         assert report["rows"][0]["vehicle_episodes"] > report["rows"][2]["vehicle_episodes"] > 0
         rows = (folder / "agents.csv").read_text().splitlines()

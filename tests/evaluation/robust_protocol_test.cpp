@@ -51,6 +51,7 @@ TEST(RobustProtocol, DrivesAControllerWhereConditionsApply) {
   EXPECT_EQ(row_named(report, "severity 1").not_driven, "sees no images");
   EXPECT_THAT(row_named(report, "severity 1").counts.scenarios, IsEmpty());
   EXPECT_FALSE(report.interrupted);
+  EXPECT_EQ(report.setting.light_heads, "visible");
   ASSERT_GT(fractions.size(), 5u);
   EXPECT_TRUE(std::is_sorted(fractions.begin(), fractions.end()));
   EXPECT_LT(fractions.front(), 0.2);
