@@ -15,7 +15,7 @@ namespace pictura::gl {
 /// Throws Error with the compiler's log.
 GLuint make_program(const Functions& gl, std::initializer_list<std::pair<GLenum, std::string>> shaders);
 
-/// Throws Error if OpenGL has reported an error. where: begin of the message.
+/// Throws Error if OpenGL has reported an error. where: beginning of the message.
 void check_errors(const Functions& gl, const std::string& where);
 
 /// Images of one size. The context must be current in all calls, including the destructor.
@@ -35,8 +35,7 @@ class ImageArray {
   void begin();
   /// Averages the first `images` layers into the buffer.
   void resolve(int images);
-  /// Appends to copies_out the copies of `images` images, from `first` on, to `out`. stride: values from one image to
-  /// the next.
+  /// Appends copies to `out` of `images` images from `first` on. stride: values from one image to the next.
   void plan_copy(int first, int images, void* out, int64_t stride, std::vector<RowCopy>* copies_out) const;
   /// Copies to the host are finished when the call returns; copies to a device are enqueued.
   void copy(Span<const RowCopy> copies, Stream stream);

@@ -13,10 +13,10 @@ namespace pictura {
 /// Returns the names of this build's simulators, and "auto".
 std::vector<std::string> simulator_names();
 
-/// Makes a simulator. The maps must be compiled with map_options(config); several simulators may share them. Their
-/// handles count from 0. "cuda" works on config.device, or on the current device if that is the host. "auto" chooses as
-/// in make_renderer(). choice_out receives the choice and its reason. Throws UsageError for an unknown name and for
-/// settings, maps or worlds that cannot be simulated, and Error if the device does not exist.
+/// Makes a simulator. The maps must be compiled with map_options(config); several simulators may share them. Map i has
+/// the handle i. "cuda" works on config.device, or on the current CUDA device if config.device is the host. "auto"
+/// chooses as in make_renderer(). choice_out receives the choice and its reason. Throws UsageError for an unknown name
+/// and for settings, maps or worlds that cannot be simulated, and Error if the device does not exist.
 std::unique_ptr<Simulator> make_simulator(const std::string& name, const SimulatorConfig& config, CompiledMaps maps,
                                           std::vector<WorldSpec> worlds, std::string* choice_out = nullptr);
 /// Compiles the maps first.

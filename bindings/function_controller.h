@@ -19,8 +19,8 @@ namespace py = pybind11;
 std::string name_of_function(const py::function& function);
 
 /// Returns a function that makes controllers, which call function(observations) with a dict of NumPy arrays [agents,
-/// ...]. The function returns actions, int [agents], or logits [agents, kNumActions] and values [agents]; argmax and
-/// seed choose actions from logits. A renderer adds images: `rgb`, u8 [agents, cameras, 3, height, width], black for
+/// ...]. `function` returns actions, int [agents], or logits [agents, kNumActions] and values [agents]. argmax and seed
+/// choose actions from logits. A renderer adds images: `rgb`, u8 [agents, cameras, 3, height, width], black for
 /// inactive agents; `rgb_0`, `rgb_1`, ... for several sizes. Controllers throw Error outside host memory, UsageError
 /// for other results, and exceptions of the function.
 std::function<std::unique_ptr<Controller>(const DriverOptions&, const Simulator&, Renderer*)> function_controllers(

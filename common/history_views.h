@@ -1,4 +1,5 @@
-// Stored views of a SceneHistory, for host and CUDA code. at() shifts a view's indices to those of the history's scene.
+// Stored views of a SceneHistory, for host and CUDA code. at() returns a stored view with indices into
+// SceneHistory::scene().
 #pragma once
 
 #include "pictura/common/scene_types.h"

@@ -8,8 +8,8 @@
 namespace pictura {
 
 /// Returns sqrt(x^2 + y^2), by the unfused corrected method of C. F. Borges, "An Improved Algorithm for hypot(a,b)",
-/// 2019. The error is at most four units in the last place. If the larger of |x| and |y| is in [1e-150, 1e150], it is
-/// at most one unit. The result then equals that of glibc's std::hypot on x86-64.
+/// 2019. The error is at most four units in the last place. If the larger of |x| and |y| is in [1e-150, 1e150], the
+/// error is at most one unit. The result then equals that of glibc's std::hypot on x86-64.
 inline double hypot_of(double x, double y) {
   constexpr double kNegligible = 0x1p-54;  // up to this ratio, the shorter leg only affects rounding
   const double longer = std::max(std::abs(x), std::abs(y)), shorter = std::min(std::abs(x), std::abs(y));

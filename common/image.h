@@ -26,8 +26,8 @@ struct ImageSize {
 };
 /// Number of values (channels of pixels) of one image, including the padding of patches.
 int64_t image_values(ImageSize size, ChannelOrder order, int patch_px = kDefaultPatch_px);
-/// Throws Error if the order is patches and renderers cannot write patches of this side. The message begins with
-/// `renderer`, which may be empty.
+/// Throws Error if the order is patches and renderers cannot write patches with sides of patch_px. The message begins
+/// with `renderer`, which may be empty.
 void check_patch_px(std::string_view renderer, ChannelOrder order, int patch_px);
 
 /// Place of one camera's images in an ImageLayout, in values (channels of pixels). Channel c of pixel (x, y) is at

@@ -34,7 +34,7 @@ struct SceneOwner {
   SceneBatch batch() const {
     return {Device{}, world_begin, agents, geometry, light_begin, light_states, hidden_agents};
   }
-  /// Ends a world, to which all new agents and lights belong.
+  /// Ends a world. All agents and lights added since the previous call belong to it.
   void end_world(GeometryHandle handle) {
     world_begin.push_back(static_cast<int32_t>(agents.size()));
     light_begin.push_back(static_cast<int32_t>(light_states.size()));

@@ -22,8 +22,8 @@ struct CaseReplayOptions {
 void check_case_number(const CaseReplayOptions& options, int64_t count);
 
 /// Simulates the case's scene again on the host, with its driver and the first policy's world. Reports the file on
-/// stderr, and whether the ego drives differently. Without a number, chooses the case that changes the first policy's
-/// value most. Throws UsageError if the case does not exist.
+/// stderr, and the ego's speed if it differs from that in the probe. Without a number, chooses the case that changes
+/// the first policy's value most. Throws UsageError if the case does not exist.
 void write_case_replay(const CaseReplayOptions& options, const RemovalOptions& probe, const RemovalResults& results);
 void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions& probe,
                        const PedestrianResults& results);

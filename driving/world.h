@@ -34,7 +34,7 @@ struct WorldOptions : SessionOptions {
 };
 
 /// Applies the options that have values. If only one of the shares of pedestrians and cyclists is given, reduces the
-/// other to a sum of at most 1. Throws UsageError if both are given and their sum exceeds 1.
+/// other so that their sum is at most 1. Throws UsageError if both are given and their sum exceeds 1.
 void apply_world_options(const WorldOptions& options, SimulatorConfig* config_inout);
 
 /// Whether `policy` names a controller.

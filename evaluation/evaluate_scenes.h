@@ -37,7 +37,7 @@ struct SceneEvaluation {
   double seconds = 0;        // wall time, including loading
   RealismReport realism;     // filled if a realism version is given
 
-  /// Returns excluded scenes, files and file ends, with reasons.
+  /// Returns excluded scenes, and files that are unreadable wholly or from some point on, with reasons.
   std::vector<std::string> faults() const;
 };
 

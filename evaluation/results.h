@@ -86,7 +86,7 @@ struct DensityResult {
 struct EvaluationSetting {
   std::string policy_hash;  // hash of the weights, or the controller's name
   std::vector<std::string> maps;
-  // Hashes of the roads (or scene files), and of all cameras' poses and lenses. maps_hash is empty if not requested,
+  // Hashes of the roads (or scene files), and of all cameras' poses and lenses. maps_hash is empty if not requested;
   // cameras_hash is empty without images. Both are empty in files of earlier versions.
   std::string maps_hash, cameras_hash;
   std::map<std::string, std::string> config;  // see keys_of_evaluation(); empty in files of earlier versions

@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// Scales the scene's boxes. Replaces a first heading by the second if they differ by more than
+/// Scales the scene's boxes. Replaces a track's first heading by its second if they differ by more than
 /// SceneProtocol::max_first_turn_deg. Throws Error if the scene's time step is not 0.1 s.
 std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const SceneProtocol& protocol);
 
@@ -23,7 +23,7 @@ struct ScenePlan {
   std::vector<int32_t> takeover_steps;  // [tracks] episode step at which the driven track appears
 };
 
-/// Returns whether a road user can be driven, before thinning and checks of overlap.
+/// Returns whether any road user can be driven, before thinning and checks of overlap.
 bool has_drivers(const CompiledMap& map, const SceneProtocol& protocol);
 
 /// map: compiled for episodes from protocol.start_step on. boxes: [tracks] at the episode's start.

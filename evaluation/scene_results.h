@@ -44,7 +44,7 @@ struct SceneCounts {
 struct SceneResults {
   EvaluationSetting setting;  // `maps` holds SceneEvaluateOptions::scenes
   SceneProtocol protocol;
-  // Unreadable files and file ends of the whole input, with reasons.
+  // Files that are unreadable wholly or from some point on, with reasons; also those outside the range of scenes.
   std::vector<std::string> unread;
   int first_scene = 0, num_scenes = 0;
   int without_drivers = 0;                       // excluded: all road users are parked or absent

@@ -13,7 +13,7 @@ constexpr bool is_route(LaneType type) { return type == LaneType::driving || typ
 /// Groups of lanes that lane changes connect.
 struct LaneGroups {
   std::vector<std::size_t> of_lane;  // [lanes] leftmost lane of the lane's group
-  // [lanes] at the leftmost lane: all members of its group
+  // [lanes] members[k]: lanes of the group whose leftmost lane is k; empty for other lanes
   std::vector<std::vector<std::size_t>> members;
 };
 LaneGroups group_lanes(const RoadMap& map);

@@ -1,4 +1,4 @@
-// Conversion to the coordinates of a map's file, which reports, events and tables print.
+// Conversion to the coordinates of a map's file, for reports, events and tables.
 #pragma once
 
 #include <array>

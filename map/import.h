@@ -35,9 +35,9 @@ class MapImport {
   InterruptibleWork work_;
 };
 
-/// Calls fill(import), and returns the validated map with its repairs. Messages of faults begin with `source`, the
-/// file's name. Throws Error if options.chord_error_m is outside [0.001, 10] m, or if options.plan mirrors or has a
-/// singular value outside [0.5, 1.5].
+/// Calls fill(import), records the repairs in the map, and returns the validated map. Messages of faults begin
+/// with `source`, the file's name. Throws Error if options.chord_error_m is outside [0.001, 10] m. Also throws if the
+/// transformation options.plan mirrors the map or has a singular value outside [0.5, 1.5].
 RoadMap import_map(std::size_t text_bytes, const std::string& source, const OpenDriveOptions& options,
                    const ImportProgress& progress, const std::function<void(MapImport* import)>& fill);
 

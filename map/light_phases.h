@@ -10,7 +10,7 @@
 namespace pictura {
 
 /// Returns the first phase whose axis is within 45 degrees of the heading or its opposite, else a new phase.
-/// `axes_inout` holds the heading of each phase's first approach, its axis.
+/// `axes_inout` holds each phase's axis: the heading of its first approach.
 inline int32_t phase_of_heading(double heading_rad, std::vector<double>* axes_inout) {
   constexpr double kSameAxis_rad = 0.25 * std::numbers::pi;
   const auto same = std::find_if(axes_inout->begin(), axes_inout->end(), [&](double axis) {

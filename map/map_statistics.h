@@ -22,8 +22,8 @@ struct MapStatistics {
   std::array<double, 4> lanes_shares{};
   // Shares by radius. Class i contains radii up to kMapRadii_m[i]; the last class contains larger radii.
   std::array<double, 4> radius_shares{};
-  // `steep_share` is steeper than kSteepGrade. `parking_share` is the length of parking lanes divided by that of
-  // driving lanes outside junctions.
+  // `steep_share` is the share of driving lanes steeper than kSteepGrade. `parking_share` is the length of parking
+  // lanes divided by that of driving lanes outside junctions.
   double steep_share = 0, parking_share = 0;
   // Numbers of junctions of 1 to 3, 4, 5, and more roads.
   std::array<int, 4> junctions_of_arms{};

@@ -49,7 +49,7 @@ void remove_edges_across_openings(const OpenLanes& open, RoadMap* map);
 /// Numbers of driving and ramp lanes.
 struct LaneUse {
   int32_t endless = 0;
-  int32_t open = 0;         // without endless roads: open lanes and their successors
+  int32_t open = 0;         // open lanes and the lanes that they lead to; 0 on maps with endless roads
   int32_t unreachable = 0;  // other lanes, which agents never use
 };
 LaneUse count_lane_use(const RoadMap& map);

@@ -16,8 +16,9 @@ struct PaintedLine {
   MarkColor color = MarkColor::white;
 };
 
-/// Returns the markings without covered lines. Lines that continue each other with equal width and colour are joined.
-/// Points are removed if the line then moves by at most kPaintTolerance_m. Ends of lines and dashes stay.
+/// Returns the markings, except lines that other lines cover along their whole length. Lines that continue each other
+/// with equal width and colour are joined. Points are removed if the line then moves by at most kPaintTolerance_m. Ends
+/// of lines and dashes stay.
 std::vector<PaintedLine> painted_lines(const RoadMap& map);
 
 /// Maximum width by which a covered road edge extends beyond painted lines. The factor is 2

@@ -1,4 +1,4 @@
-// Linear transformation of the ground plane (the plan), which makes an affine copy of a map.
+// The plan of an affine copy of a map: a linear transformation of the ground plane.
 #pragma once
 
 namespace pictura {

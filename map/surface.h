@@ -33,8 +33,7 @@ class Surface {
   /// Finds the candidates for several queries near `p`.
   void find_near(const Eigen::Vector2d& p, double z, Candidates* out) const;
 
-  /// Whether any band that is_wanted(band) accepts covers `p`. `p` must be within kNear_m of the position given to
-  /// find_near().
+  /// Whether a band with is_wanted(band) covers `p`. `p` must be within kNear_m of the position given to find_near().
   template <typename IsWanted>
   bool any_near(const Candidates& near, const Eigen::Vector2d& p, double z, IsWanted&& is_wanted) const {
     return any_near(near, p, z, is_wanted, [](int32_t) { return true; });
@@ -51,8 +50,8 @@ class Surface {
   }
   static constexpr double kNear_m = 0.1;
 
-  /// Whether the band folds over itself at `p`, as in a turn tighter than its width. Then a quad more than `reach_m`
-  /// along the band from quad `from` covers `p`.
+  /// Whether the band folds over itself at `p`, as in a turn tighter than its width. That is, a quad of the band covers
+  /// `p` and is more than `reach_m` away from quad `from`, measured along the band.
   bool is_folded_over(const Candidates& near, const Eigen::Vector2d& p, double z, int32_t band, std::size_t from,
                       double reach_m) const;
 

@@ -24,7 +24,7 @@ class ImageBackbone {
   int64_t channels() const;
   /// Hash of the file: 16 hexadecimal digits.
   const std::string& hash() const;
-  /// Trained weights, empty if frozen. Their names are "image_backbone." and the name in the program.
+  /// Trained weights, empty if frozen. Each name is "image_backbone." followed by the name in the program.
   const std::vector<NamedTensor>& parameters() const;
   /// Throws Error naming file and camera if the program supports one image size and a camera has another.
   void check_images(const Rig& rig) const;

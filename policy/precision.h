@@ -12,8 +12,8 @@ namespace pictura {
 void set_float32_products(Precision precision);
 
 /// Sets for the whole process whether torch, cuDNN and cuBLAS compute the same bits in every run. Call it before the
-/// first product on a device, because torch then reads CUBLAS_WORKSPACE_CONFIG. Throws Error if this environment
-/// variable has a different value.
+/// first product on a device, because torch then reads CUBLAS_WORKSPACE_CONFIG. If `reproducible`, throws Error if this
+/// variable has a value with which cuBLAS is not reproducible.
 void set_reproducible(bool reproducible);
 
 /// Scope in which cuDNN times its algorithms for every new size, and selects the fastest. Has no effect if torch is

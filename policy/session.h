@@ -18,8 +18,8 @@ struct Config;
 struct SessionParts;
 
 /// Returns the training configuration with the changes of the options. The options determine the device settings,
-/// because these depend on the machine. Unless the options name a renderer, cpu and cuda become auto, because all three
-/// draw the same images.
+/// because these depend on the machine. Unless the options name a renderer, the renderers cpu and cuda become auto,
+/// because both draw the same images.
 Config with_session_options(const Config& trained, const SessionOptions& options);
 
 /// Observations of a batch, in the memory of the session's device.
@@ -35,7 +35,7 @@ struct PolicyInput {
   bool hides_auxiliary = false;
 };
 
-/// Controller that drives agents with a policy. On a device, act() waits for the number of its agents.
+/// Controller that drives agents with a policy. On a GPU, act() waits to read the number of agents that it commands.
 class PolicyController : public Controller {
  public:
   /// Number of agents that the last act() commanded.
@@ -74,8 +74,8 @@ class PolicySession {
   /// Device of the network, simulators, renderers and all arrays.
   Device device() const;
 
-  /// Cameras, randomization and samples are those of the options. Minimum width of drawn lines and palette are those of
-  /// training.
+  /// Cameras, randomization and samples are those of the options. The palette and the minimum width of drawn lines are
+  /// those of training.
   RendererConfig renderer_config() const;
   /// Returns a renderer on device(), to which the caller must upload the maps; null if the policy reads no images.
   /// Throws Error if the renderer cannot run on this machine.

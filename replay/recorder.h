@@ -48,7 +48,8 @@ ReplayDecision decision_of(Span<const float> logits, float value);
 
 ReplayBox replay_box(const AgentBox& box);
 
-/// Throws Error if such a replay would exceed kMaxReplayNumbers, before Recorder::after_step() does.
+/// Throws Error if a replay of this size would exceed kMaxReplayNumbers. Recorder::after_step() throws only once the
+/// limit is reached.
 void check_replay_room(int num_agents, int64_t num_steps);
 
 /// Records one world.

@@ -17,7 +17,7 @@
 
 namespace pictura {
 
-/// Maximum number of track values, in 256 MB.
+/// Maximum number of track values, which take 256 MiB.
 constexpr int64_t kMaxReplayNumbers = int64_t{1} << 26;
 
 /// Only version of the file format that readers accept.

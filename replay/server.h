@@ -18,7 +18,7 @@ struct LiveServerOptions {
   int port = 0;  // 0: any free port
   // If set, listens on all addresses, and accepts requests to this name and the loopback's names.
   std::string host_name;
-  int num_agents = 0;  // exclusive limit of agents in requests
+  int num_agents = 0;  // agents in requests must be below it
 };
 
 /// Maximum number of simultaneous pages.

@@ -12,7 +12,7 @@ namespace pictura {
 
 std::string html_text(std::string_view text);
 
-/// Returns JSON for an HTML script element, which no string in it can end.
+/// Returns JSON for an HTML script element; no string in the JSON can end the element.
 std::string script_text(const nlohmann::ordered_json& json);
 
 /// Replaces each {{name}} by its value. Every name must occur.

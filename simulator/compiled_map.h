@@ -22,8 +22,8 @@ struct MapOptions {
   bool observe_walls = false;    // build rules.near_wall_pieces
   bool recorded_lights = false;  // lights of a recorded scene; see compile_scenario()
   // Maximum length of observed pieces of lanes and boundaries. 0, as in training: pieces are at most 10 m long and 0.25
-  // m off the curve. Above 0, as in the paper's evaluation of recorded scenes: parts that are straight within 2 cm are
-  // cut evenly.
+  // m off the curve. Above 0, as in the paper's evaluation of recorded scenes: each part that is straight within 2 cm
+  // is cut into equal pieces of at most this length.
   float observed_span_m = 0;
   bool operator==(const MapOptions&) const = default;
 };

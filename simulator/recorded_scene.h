@@ -15,17 +15,18 @@ namespace pictura {
 constexpr float kRecordedHeadAhead_m = 15.0f, kRecordedHeadHeight_m = 5.0f;
 
 /// Compiles the map of a scene. Its tracks become the agents of worlds, in the same order. Each agent starts an episode
-/// in its recorded state at start_step, or absent without such a state. With options.recorded_lights, the scene's
-/// lights are drawn and observed, and stop traffic. Light heads are not recorded; they are drawn kRecordedHeadAhead_m
-/// past the stop line. Throws Error, which names scene and track, without a drivable lane, with more than
-/// kMaxAgentsPerWorld tracks, or with a too large track. Throws UsageError for a null pointer or if the recording has
-/// no step start_step.
+/// in its recorded state at start_step, or is absent if it has none. With options.recorded_lights, the scene's lights
+/// are drawn and observed, and stop traffic. Light heads are not recorded; they are drawn kRecordedHeadAhead_m past the
+/// stop line. Throws Error, which names the scene or track, if there is no drivable lane, if there are more than
+/// kMaxAgentsPerWorld tracks, or if a track's box is too large. Throws UsageError for a null pointer or if the
+/// recording has no step start_step.
 std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenario> scenario,
                                                     const MapOptions& options = {}, int32_t start_step = 0);
 
 /// Map of a scene for worlds of at most num_agents agents. The first agents are the tracks in `driven`; further agents
-/// are never present. The tracks in `replayed` follow their records as the first parked cars. An agent whose track is
-/// absent at the start takes no part in the episode. Throws UsageError unless 1 <= driven.size() <= num_agents.
+/// are never present. The tracks in `replayed` follow their records, and take the boxes of the first parked cars. An
+/// agent whose track is absent at the start takes no part in the episode. Throws UsageError unless 1 <= driven.size()
+/// <= num_agents.
 std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<const int32_t> driven,
                                                Span<const int32_t> replayed, int num_agents);
 
@@ -36,9 +37,9 @@ SimulatorConfig scene_config(const Scenario& scenario, int32_t start_step = 0, S
 /// World with one agent for each track. `index` is the map's index in the simulator.
 WorldSpec scene_world(const CompiledMap& map, int index = 0, uint32_t global_world = 0);
 
-/// Returns [tracks] 1 for selected tracks. `words` are separated by commas: self or sdc (the self-driving car),
-/// vehicles (other vehicles), others (all except vehicles), all, tracks_to_predict, objects_of_interest, and track ids.
-/// Throws UsageError for other words, but not for words that select no track.
+/// Returns a mask [tracks]: 1 for each selected track. `words` are separated by commas: self or sdc (the self-driving
+/// car), vehicles (other vehicles), others (all except vehicles), all, tracks_to_predict, objects_of_interest, and
+/// track ids. Throws UsageError for other words, but not for words that select no track.
 std::vector<uint8_t> tracks_selected_by(const Scenario& scenario, const std::string& words);
 /// As tracks_selected_by(), but also throws UsageError for a word that selects no track.
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words);

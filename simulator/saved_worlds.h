@@ -9,8 +9,8 @@
 
 namespace pictura {
 
-/// Returns part `part` of num_parts parts of consecutive worlds with about equally many agents, at least one world
-/// each. Throws UsageError if there are fewer worlds than parts.
+/// Splits the worlds into num_parts consecutive ranges with about equally many agents, and at least one world each.
+/// Returns range `part`. Throws UsageError if there are fewer worlds than parts.
 std::vector<WorldSpec> worlds_in_part(const std::vector<WorldSpec>& all, int part, int num_parts);
 
 /// Joins the states saved by the simulators of all parts, of which `simulator` is one. Throws Error as
@@ -29,8 +29,9 @@ struct SavedWorld;
 std::vector<std::shared_ptr<const SavedWorld>> extract_worlds(const Simulator& simulator, Span<const uint8_t> saved,
                                                               const std::vector<size_t>& worlds);
 
-/// Returns a state for simulator.restore() in which world i has the state worlds[i], even from a simulator with other
-/// observations or walls. Throws Error if a world differs in map, id, or number of agents, boxes or lights.
+/// Returns a state for simulator.restore() in which world i has the state worlds[i]. worlds[i] may come from a
+/// simulator with other observations or walls. Throws Error if a world differs in map, id, or number of agents, boxes
+/// or lights.
 std::vector<uint8_t> saved_state_of(const Simulator& simulator, const std::vector<const SavedWorld*>& worlds);
 
 }  // namespace pictura

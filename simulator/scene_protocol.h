@@ -25,7 +25,7 @@ struct SceneProtocol {
   int start_step = 0;                     // recorded step at episode starts
   int steps = 600;
   std::vector<double> densities{1.0, 0.75, 0.5};  // remaining shares of a scene's road users
-  int rollouts = 1;                               // drives per scene, each with own random draws
+  int rollouts = 1;                               // drives per scene, each with its own random draws
   float box_scale = 1;                            // factor on length and width of boxes
   // A road user nearer to its goal at the start follows the recording.
   float min_distance_to_goal_m = 2;
@@ -42,7 +42,7 @@ struct SceneProtocol {
   RecordEnd record_end = RecordEnd::stand;  // replayed road users after their recording
   AfterInfraction after_infraction = AfterInfraction::halt;
   bool leave_at_goal = true;
-  Waypoints waypoints = Waypoints::goal;  // `goal`: three times the goal; `path`: two points on the recorded path first
+  Waypoints waypoints = Waypoints::goal;  // `path`: two points on the recorded path, then the goal
   float observed_span_m = 5;              // see MapOptions
 };
 

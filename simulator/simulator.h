@@ -32,7 +32,7 @@ constexpr int kMaxBoxes = 1 << 24;  // agents and parked cars; also maximum numb
 /// Defaults are those of the paper's training.
 struct SimulatorConfig {
   uint64_t seed = 0;
-  Device device;        // for observations and scenes; `auto` selects its executor
+  Device device;        // for observations and scenes; make_simulator("auto") chooses the executor by it
   int num_threads = 0;  // on the host; 0: all
   float dt_s = 0.1f;    // in [0.01, 0.1]
   int episode_steps = 1280;
@@ -140,8 +140,8 @@ struct SpawnReport {
 ///
 /// On a CUDA device, each call makes that device current and restores the caller's device. Calls put work on a stream
 /// and share memory: issue them on one stream, or make each call wait for the previous one. step(), set_state(),
-/// observe() and reset() with a mask neither wait nor allocate there, and a CUDA graph can capture them. poll(),
-/// check() or the next call throws errors of values, such as actions, slots and queries.
+/// observe() and reset() with a mask neither wait nor allocate there, and a CUDA graph can capture them. If a value
+/// (such as an action, slot or query) is invalid, poll(), check() or the next call throws the error.
 class Simulator {
  public:
   virtual ~Simulator() = default;

@@ -51,7 +51,7 @@ inline WorldsToken new_worlds_token() { return std::make_shared<const char>(); }
 
 /// Side of the cells that sort a world's boxes; see HostWorlds.
 constexpr float kBoxCell_m = 25.0f;
-/// Cells that cover a map of any size.
+/// Number of cells that cover a map along x and y.
 struct BoxCellCounts {
   int64_t num_x, num_y;
 };

@@ -23,7 +23,8 @@ struct SimulatorState {
   /// Hash of the agents' fields, light states and parked cars.
   uint64_t hash(const SimulatorSetup& setup) const;
 
-  /// Copies `count` worlds from `from_world` on to the worlds from `world` on. Each pair must have equal sizes.
+  /// Copies worlds [from_world, from_world + count) of `from` to worlds [world, world + count). Each pair must have
+  /// equal sizes.
   void copy_worlds(const SimulatorSetup& setup, int world, const SimulatorState& from, const SimulatorSetup& from_setup,
                    int from_world, int count);
 

@@ -11,7 +11,8 @@ class StepObserver {
   virtual ~StepObserver() = default;
   /// Whether the next step may be taken. The call may block for a short time.
   virtual bool is_due() { return true; }
-  /// Replaces the commands [slots] of agents that the observer drives, before the first before_step().
+  /// Replaces the commands [slots] of agents that the observer drives. Called in each step before any observer's
+  /// before_step().
   virtual void override_commands(Span<Command> /*commands_inout*/) {}
   virtual void before_step(Span<const Command> /*commands*/) {}
   virtual void after_step(const StepResult& /*result*/) {}

@@ -1,5 +1,5 @@
-// Actions and advantages of a rollout's agents, separately at rest and moving. A mean over both could not tell a policy
-// that stands still from one that drives safely.
+// Actions and advantages of a rollout's agents, separately for agents at rest and for moving agents. A mean over both
+// could not tell a policy that stands still from one that drives safely.
 #pragma once
 
 #include <array>

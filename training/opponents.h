@@ -15,8 +15,8 @@ namespace pictura {
 class Opponents {
  public:
   /// Reads the policies of simulator.others.policies. Throws Error naming a file that contains no policy. Throws Error
-  /// if a policy has auxiliary slots that the learner must not have. Throws Error if a policy's decision steps do not
-  /// divide train.num_steps.
+  /// if a policy and the learner read no images, and only the policy has auxiliary slots. Throws Error if a policy's
+  /// decision steps do not divide train.num_steps.
   Opponents(const Config& config, Device device, Communicator* communicator);
   ~Opponents();
   Opponents(const Opponents&) = delete;
@@ -29,7 +29,7 @@ class Opponents {
 
   /// Mask of the agents that the learner now drives, u8 [slots].
   at::Tensor own_slots(const SimulatorArrays& input) const;
-  /// Returns the commands of all agents, [slots], until the next call. The learner's agents take `own_actions`,
+  /// Returns the commands of all agents, [slots], valid until the next call. The learner's agents take `own_actions`,
   /// [slots]; opponents draw actions for the others. On a GPU, waits to read the number of each opponent's agents.
   Span<const Command> commands(const SimulatorArrays& input, Span<const int32_t> own_actions, PolicyExecutor* executor);
 

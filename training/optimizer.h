@@ -31,7 +31,7 @@ class Optimizer {
   /// Second moments of AdamW's parameters, in the order of parameters.
   std::vector<NamedTensor> second_moments;
   /// Factors of AdamW's learning rate, in the order of parameters: 1, or less for weights that change together
-  /// (policy/patch_spread.h). gradient_norm() weights squares of gradients by them; weight decay ignores them.
+  /// (policy/patch_spread.h). gradient_norm() multiplies squares of gradients by them; weight decay ignores them.
   std::vector<double> rate_factors;
   int64_t steps = 0;
 

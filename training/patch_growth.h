@@ -9,7 +9,7 @@ class Optimizer;
 class Policy;
 class WeightAverage;
 
-/// Variants for fp32 tensors on any device.
+/// Variants of the functions in policy/patch_spread.h for fp32 tensors on any device.
 at::Tensor spread_over_patches(const at::Tensor& weight, int factor);
 at::Tensor repeat_over_patches(const at::Tensor& weight, int factor);
 

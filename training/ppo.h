@@ -16,8 +16,9 @@ struct AdvantageFilter {
   double average = -1;  // average over rollouts; negative: none yet
 };
 
-/// Maximum rounding differences between the rollout's and the learner's log-probabilities before the first step: their
-/// mean, and the share of ratios outside the clip range. Beyond them, log-probabilities are recomputed.
+/// Limits of rounding differences between the rollout's and the learner's log-probabilities before the first step: of
+/// the mean absolute difference, and of the share of ratios outside the clip range. Beyond them, log-probabilities are
+/// recomputed.
 constexpr double kMaxAbsLogRatio = 1e-3, kMaxClipFraction = 1e-3;
 
 /// Statistics of an update.

@@ -57,13 +57,13 @@ class RunLog {
   RunLog(const std::string& folder, const Config& config, int64_t updates_done, int64_t agent_steps,
          const std::vector<RecentUpdate>& recent, const std::function<void(const std::string&)>& on_notice);
 
-  /// Writes row and event of an update, which `update` and `agent_steps` include. Sends a notice for the first update
-  /// whose log-probabilities were recomputed.
+  /// Writes row and event of an update. `update` and `agent_steps` are the run's totals after it. Sends a notice for
+  /// the first update whose log-probabilities were recomputed.
   TrainProgress add(int64_t update, int64_t agent_steps, const UpdateRecord& record);
 
   /// Writes row and event of an evaluation after `update` updates.
   void add_evaluation(int64_t update, int64_t agent_steps, const EvaluationRecord& record);
-  /// Whether an existing evaluation.csv lacks a row after `update` updates.
+  /// Whether evaluation.csv is written, but its last row is not that of `update`.
   bool lacks_evaluation(int64_t update) const { return evaluation_csv_ && evaluation_csv_->last_update() != update; }
   /// Wall time of evaluations, which rates exclude.
   double evaluation_s() const { return evaluation_s_; }

@@ -173,8 +173,8 @@ __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& 
   }
 }
 
-// Returns the number of each warp's passes over a list. A lane takes entry lane * passes + pass, because neighbouring
-// entries tend to be equally expensive.
+// Returns the number of passes over a list, of all warps together. In each pass, a lane takes entry lane * passes +
+// pass: neighbouring entries, which tend to be equally expensive, are in different passes.
 template <int kThreads>
 __device__ inline int passes_of(int count) {
   const unsigned rounds = static_cast<unsigned>(count + kThreads - 1) / kThreads;

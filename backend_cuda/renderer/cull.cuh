@@ -157,8 +157,8 @@ __device__ inline void cull_pieces(BlockState* state, CullShared* storage, Entry
       range = pieces_of_row(pieces_of(geometry, of_walls), storage->sides,
                             of_walls != 0 ? row - rows.count[0] + rows.begin[1] : row + rows.begin[0]);
     }
-    // Pieces of all rows are numbered consecutively, strips first. A row's offset is a piece's grid index minus its
-    // number.
+    // Pieces of all rows are numbered consecutively, strips first. A piece's grid index is its number plus its row's
+    // offset.
     const bool has_some = range.count > 0;
     const int end = warp_inclusive_sum(range.count), begin = end - range.count;
     const int total = __shfl_sync(kAllLanes, end, kWarpSize - 1);

@@ -116,7 +116,7 @@ __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragm
   memory->rows = reinterpret_cast<Word*>(bytes + rows_begin);
   memory->max_rows = static_cast<int32_t>((candidates_begin - rows_begin) / sizeof(Word));
   memory->candidates = reinterpret_cast<Word*>(bytes + candidates_begin);
-  // Most candidates become fragments. A longer list would thus exceed max_fragments.
+  // Most candidates become fragments. The fragments of a longer list would thus exceed max_fragments.
   memory->max_candidates = max_fragments + max_fragments / 2;
   return layout.used;
 }

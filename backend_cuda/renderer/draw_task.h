@@ -30,7 +30,8 @@ class SortedPieces {
 DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeCamera>& cameras,
                         const SceneBatch& scene, const ViewBatch& views, const ImageBatch* images);
 
-/// Returns a block's scratch sizes in the overflow launch, for all primitives of a world. pieces: includes light heads.
+/// Returns a block's scratch sizes in the overflow launch, for all primitives of a world. `pieces` counts light heads
+/// too.
 Scratch overflow_sizes(int pieces, int heads, std::size_t agents);
 
 /// `fault` must not be `none`.

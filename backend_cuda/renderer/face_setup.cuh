@@ -1,5 +1,5 @@
-// Face set-up: from entries to faces on screen. Nearly all faces have four corners and need no clipping; one lane sets
-// up such a face. Other faces are listed and clipped in batches.
+// Face set-up: from list entries (objects that may be visible) to faces on screen. Nearly all faces have four corners
+// and need no clipping; one lane sets up such a face. Other faces are listed and clipped in batches.
 #pragma once
 
 #include "pictura/backend_cuda/renderer/clip.cuh"
@@ -184,8 +184,9 @@ __device__ inline bool make_warp_face(const FaceSetupContext& context, ClipShare
   return true;
 }
 
-// Clips and sets up the faces of active lanes. Faces with too many corners for a lane only set *quad_out and
-// *has_too_many_corners_out. Returns false in lanes whose edges do not fit. Collective over the warp.
+// Clips and sets up the faces of active lanes. A face with too many corners for a lane is left to the caller, in
+// *quad_out; *has_too_many_corners_out is then true. Returns false in lanes whose edges do not fit. Collective over the
+// warp.
 __device__ inline bool clip_quads(const FaceSetupContext* contexts, ClipShared* storage, bool is_active,
                                   ClippedPrimitive primitive, Quad* quad_out, bool* has_too_many_corners_out) {
   const FaceSetupContext& context = contexts[primitive.image];

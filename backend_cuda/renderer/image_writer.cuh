@@ -136,7 +136,7 @@ struct ImageWriter {
     if (is_right || place.y + 1 == height_px) blacken_beyond(image, place, width_px, height_px, patch_px);
   }
 
-  // Blackens these pixels' patch beyond the image. It is not inlined, to save registers.
+  // Blackens the part of these pixels' patch that is beyond the image. It is not inlined, to save registers.
   template <typename Value>
   __device__ __noinline__ static void blacken_beyond(Value* image, Place place, int width_px, int height_px,
                                                      int patch_px) {

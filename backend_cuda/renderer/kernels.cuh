@@ -1,4 +1,4 @@
-// The drawing kernels, which launch.cu compiles ahead of time, and NVRTC at run time.
+// The drawing kernels. They are compiled ahead of time (in launch.cu) and at run time (by NVRTC).
 #pragma once
 
 #include "pictura/backend_cuda/renderer/face_setup.cuh"

@@ -235,7 +235,7 @@ __device__ bool draw_part(const Memory& memory, int num_faces, const Part& part,
                           const Write& write) {
   list_rows(memory, num_faces, part);
   sync_block();
-  // Without rows, the counters are already 0; other threads may still read num_rows.
+  // Without rows, the counters are already 0. A reset would race with threads that still read num_rows.
   if (memory.state->num_rows != 0) {
     if (!draw_rows(memory, part, visit, write)) return false;
     reset_counts(memory);
@@ -258,7 +258,7 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
     if (columns == whole.num_columns() && rows == whole.num_rows()) plan = {whole.x_begin, columns, columns, rows};
     int x = part.x_begin, y = part.y_begin;
     if (is_drawn) {
-      // The next part is in the same row of parts, else in the band's next row, else in the next band.
+      // The next part is in the same row of parts, else in the next row of the vertical band, else in the next band.
       const int band_end = min_of(plan.band_begin + plan.band_px, whole.x_end);
       x = part.x_end;
       if (x == band_end) {

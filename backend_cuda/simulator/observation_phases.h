@@ -14,7 +14,7 @@ class ObservationWriter {
   static constexpr int kStaging = max_of(max_of(max_of(kMaxLanes, kMaxBoundaries), kMaxWalls) * kLaneFeatures,
                                          max_of(kMaxPartners* kPartnerFeatures, kMaxControls* kControlFeatures));
 
-  /// Writes observe_set() of every set to a row of `out`.
+  /// Writes every set to a row of `out`, as observe_set() does.
   template <typename ThreadGroup, typename Observation>
   PICTURA_HD static void write_sets(const ThreadGroup& group, const WorldView& world, int agent,
                                     const Observation& observation, const ObservationView& out, int row, Hides hidden) {

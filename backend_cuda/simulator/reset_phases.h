@@ -223,7 +223,8 @@ void launch_sort_boxes(const Launch& launch, const PhaseArrays& arrays, bool end
   if (arrays.has_crowds) launch.teams(arrays.num_worlds, SortBoxes{arrays, ends_step});
 }
 
-/// Prepares a world's next episode as soon as the memory for it is free. Its start does not depend on earlier steps.
+/// Prepares a world's next episode as soon as the memory for it is free. The episode's start does not depend on earlier
+/// steps.
 struct PrepareEpisode {
   PhaseArrays arrays;
   template <typename Team>

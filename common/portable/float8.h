@@ -9,7 +9,8 @@
 
 namespace pictura {
 
-// Two types, because programs may mix code with and without AVX2. Their calling conventions differ.
+// Two types, because programs may mix code with and without AVX2. Two types, because programs may mix code with and
+// without AVX2, and the two kinds of code pass the types differently.
 #if defined(__AVX2__) && !defined(__CUDACC__)
 inline namespace float8_in_a_register {
 
@@ -111,7 +112,7 @@ inline void gather_pairs(const float* from, const int32_t* indices, Float8* firs
 /// For each element k, loads four unaligned floats at from(k). Float j goes to four_out[j].
 template <typename From>
 inline void gather_fours(From&& from, Float8* four_out) {
-  // Elements k and k + 4 are the halves of one register.
+  // One register holds the four floats of element k (lower half) and of element k + 4.
   const auto two = [&](int k) {
     const auto four = [&](int i) { return _mm_loadu_ps(static_cast<const float*>(from(i))); };
     return _mm256_set_m128(four(k + 4), four(k));
@@ -177,7 +178,7 @@ struct SmallestKeys {
     __m256d carried = _mm256_setzero_pd();  // element before the current four
     for (__m256d& four : keys) {
       const __m256d rotated = _mm256_permute4x64_pd(four, 0x93);
-      // A larger element becomes the larger of the new key and the element's predecessor.
+      // An element above the new key becomes the maximum of the new key and the element's predecessor.
       four = _mm256_max_pd(_mm256_min_pd(four, all_new), _mm256_blend_pd(rotated, carried, 1));
       carried = rotated;
     }

@@ -42,7 +42,7 @@ PICTURA_HD inline float min_no_nan(float a, float b) {
 #if defined(__CUDA_ARCH__)
   return fminf(a, b);
 #elif defined(__AVX__)
-  // Assembly, because g++ 12 compiles a constant b to a branch, which is often mispredicted.
+  // Assembly, because if b is a constant, g++ 12 emits a branch, which is often mispredicted.
   float minimum;
   asm("vminss %2, %1, %0" : "=x"(minimum) : "x"(a), "xm"(b));
   return minimum;

@@ -44,7 +44,7 @@ PICTURA_HD inline Vec3 to_camera(const PinholeCamera& camera, Vec3 world_m) {
 }
 
 /// View frustum, including the guard band. It holds the slopes x/depth and y/depth of the sides, scales for distances
-/// to the sides, and the slopes of one pixel.
+/// to the sides, and the slopes' change per pixel.
 struct Frustum {
   float x_low = 0, x_high = 0, y_low = 0, y_high = 0;
   float x_low_scale = 0, x_high_scale = 0, y_low_scale = 0, y_high_scale = 0;

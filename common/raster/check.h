@@ -13,7 +13,7 @@ namespace pictura {
 /// Throws Error unless both devices are equal. `what` is "scene" or "images".
 void check_device(std::string_view renderer, std::string_view what, Device expected, Device device);
 
-/// Throws Error unless the renderer can draw these images of its rig and of this number of views.
+/// Throws Error unless the renderer can draw num_views views into these images.
 void check_images(const Renderer& renderer, std::size_t num_views, const ImageBatch& images);
 
 /// Returns the configuration. Throws Error if its rig, line floor or randomization is invalid.

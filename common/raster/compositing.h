@@ -18,7 +18,7 @@ class PixelAccumulator {
     float area = 0;
     Kind kind = kWhole;
   };
-  /// One factor of the weights per kind, known after all fragments have been added.
+  /// For each kind, the factor of its fragments' weights. It is known after all fragments have been added.
   struct Shares {
     float of_kind[kNumKinds] = {1.0f, 1.0f, 1.0f};
     PICTURA_HD float of(Weight weight) const { return weight.area * of_kind[weight.kind]; }
@@ -85,8 +85,9 @@ class PixelAccumulator {
   Part part_[kNumKinds];
 };
 
-/// Removes the visible samples of full fragments that other fragments hide. for_each(visit) calls visit(coverage,
-/// &visible) for each fragment. Changes nothing for fewer than two full fragments, or if no sample would remain.
+/// Removes from the visible samples of full fragments those that are also visible in other fragments with samples.
+/// for_each(visit) calls visit(coverage, &visible) for each fragment. Changes nothing for fewer than two full
+/// fragments, or if no sample would remain.
 template <typename ForEach>
 PICTURA_HD inline void divide_remainder(ForEach&& for_each) {
   uint64_t hidden = 0, left = 0;
@@ -130,8 +131,8 @@ PICTURA_HD inline Rgb rgb_of_bytes(uint32_t bytes) {
   return rgb8(byte(0), byte(1), byte(2));
 }
 
-/// Visible weight of an agent in a view's images, among all faces and alone. Integer sums do not depend on the order of
-/// fragments.
+/// Weight of an agent in a view's images: among all faces, and when drawn alone. Integer sums do not depend on the
+/// order of fragments.
 struct VisibilitySum {
   int64_t among_all = 0, alone = 0;
 

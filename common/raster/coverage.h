@@ -64,11 +64,11 @@ PICTURA_HD inline SampleRange whole_range() {
   return {make_int16x8([](int) { return -kFar_units; }), make_int16x8([](int) { return kFar_units; })};
 }
 
-/// Summand that moves a height to the lowest bits of a float's mantissa. Heights are fractions of kLines_rows
+/// Summand that moves a height to the lowest bits of a float's mantissa. The height is divided by kLines_rows
 /// (edges.h).
 constexpr float kToLowestBits = 1 << 8;  // the lowest bit is 1 / (kLines_rows * kRowUnits)
-/// For each column, the difference between an edge's heights there and in the first column right of the pixel's centre,
-/// minus 2^14. With kToLowestBits, the centre has height 2^14.
+/// For each column, an edge's height relative to the first column right of the pixel's centre, minus 2^14. narrow()
+/// adds a height in which the pixel's centre is 2^14, so sums are relative to the centre.
 PICTURA_HD inline Int16x8 column_heights(const PolygonEdge& edge) {
   return arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
 }

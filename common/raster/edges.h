@@ -37,14 +37,14 @@ PICTURA_HD inline void for_each_edge(const PolygonEdge* edges, int count, Visit&
   }
 }
 
-/// An edge is level, and bounds no area, if its ends differ by less than kLevel_px in y. Smaller differences than
-/// kUpright_px in x are increased to kUpright_px.
+/// An edge is level, and bounds no area, if its ends differ by less than kLevel_px in y. Differences in x below
+/// kUpright_px are increased to it.
 constexpr float kLevel_px = 1e-6f, kUpright_px = 1e-6f;
 constexpr int kSampleColumns = kInt16x8Size, kSampleRows = 8;
 /// Sample tests use 16-bit heights, kRowUnits per row, relative to the pixel's centre. Heights are clamped to
 /// +-kLines_rows / 2 in the first column right of the centre. They change by at most kSteepest rows per column, so 16
-/// bits do not overflow. Steeper lines get this slope. Otherwise, upright lines would quantize areas to eighths of the
-/// pixel.
+/// bits do not overflow. Steeper lines get this slope. With their own slope, upright lines would quantize areas to
+/// eighths of the pixel.
 constexpr int kRowUnits = 128;
 constexpr float kLines_rows = 256.0f, kSteepest = 9.0f;
 

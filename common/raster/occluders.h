@@ -22,7 +22,7 @@ PICTURA_HD inline bool may_occlude(const WallFace& wall, const PinholeCamera& ca
   return to_camera(camera, wall_middle(wall)).z - wall_radius_m(wall) < kOccluderRange_m;
 }
 
-/// Twice the minimum area of an occluder, and the minimum divisor of its sides' normals.
+/// Twice the minimum area of an occluder, and the minimum length by which its sides' normals are divided.
 constexpr float kMinOccluder_px2 = 1.0f, kMinSide_px = 1e-3f;
 /// Maximum distance of an occluder's corners from the image, for precision.
 constexpr float kMaxOccluder_px = 4096.0f;

@@ -31,7 +31,7 @@ struct alignas(16) ScreenFace {
   uint32_t object_id = 0;  // see visibility.h
   // Range of the inverse depth over the corners, widened by kWidenedDepth for strips.
   float inverse_depth_low = 0, inverse_depth_high = 0;
-  float nearest_standing = 1;  // 1 except for strips seen from below
+  float nearest_standing = 1;  // see nearest_standing() in visibility.h; 1 except for strips seen from below
   float plane_distance_m = 0;  // height of a strip's plane above the camera; 0 for other faces
   Rgb color;
   uint32_t color_bytes = 0;  // to_bytes(color)

@@ -27,8 +27,8 @@ PICTURA_HD inline FacePlane quad_plane(const Vec3* corners) {
   return {normal, dot(normal, corners[0])};
 }
 
-/// Brightness of a face: 1 minus the mean depth of its corners, as a share of kVisibleRange_m in [0, 1]. A face with
-/// brightness 0 is not drawn and occludes nothing.
+/// Brightness of a face: 1 minus the mean of its corners' depths, each as a share of kVisibleRange_m clamped to [0, 1].
+/// A face with brightness 0 is not drawn and occludes nothing.
 PICTURA_HD inline float face_brightness(const Vec3* corners, int count) {
   float faded = 0.0f;
   PICTURA_UNROLL_FOUR

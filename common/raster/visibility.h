@@ -1,6 +1,6 @@
 // Visibility within a pixel, for host and CUDA code. A fragment is the part of a pixel that one face covers. For each
-// pair of fragments, functions decide which samples one hides from the other. The nearer plane at the centroid of the
-// shared samples is in front, so primitives need no order.
+// pair of fragments, samples_in_front() and occluded_samples() decide which samples of one the other hides. The nearer
+// plane at the centroid of the shared samples is in front, so primitives need no order.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -138,7 +138,7 @@ PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
 /// through the strip.
 PICTURA_HD inline bool is_strip_from_below(const ScreenFace& face) { return face.plane_distance_m > 0.0f; }
 
-/// Maximum ratio, on a ray from the camera, of the inverse depths of a solid and of the strip on which it stands.
+/// Maximum of a solid's inverse depth, divided by that of the strip on which it stands, on one ray from the camera.
 /// Solids extend up to kThroughStrip_m below the strip. The ratio is infinite for a camera within this distance below
 /// the strip, and 1 for a camera above.
 PICTURA_HD inline float nearest_standing(float plane_distance_m) {
@@ -184,8 +184,8 @@ PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec
   const bool first = are_equal_depths(inverse_depth_a, inverse_depth_b) ? a.object_id < b.object_id
                                                                         : inverse_depth_a > inverse_depth_b;
   if (strip_a == strip_b) return first;
-  // By depth, the solid is beneath the strip. A solid that stands on the strip only cuts into the road, so the order is
-  // reversed.
+  // Here, the depths put the solid below the strip. A solid that stands on the strip only cuts into the road, so the
+  // order is reversed.
   const bool is_strip_first = first == strip_a, is_from_below = is_strip_from_below(strip_a ? a : b);
   if (is_strip_first == is_from_below) return first;
   return stands(strip_a ? b.object_id : a.object_id, strip_a ? a.object_id : b.object_id) ? !first : first;
@@ -242,9 +242,9 @@ PICTURA_HD inline float inverse_depth_half_range(const ScreenFace& face) {
 /// Number of used bits of occluder_bound(), from the highest.
 constexpr int kOccluderBoundBits = 21;
 /// Lower bound of the inverse depth of a face that covers a pixel fully. The face hides all faces whose inverse depth
-/// is below the bound in the whole pixel. The bound of a strip is 0, because other faces may be in front. The bound is
-/// never negative, because kernels sort by its bits. It is reduced by more than kEqualDepth, so that equally near faces
-/// stay.
+/// is below the bound in the whole pixel. The bound of a strip is 0, because farther faces may be in front of it. The
+/// bound is never negative, because kernels sort by its bits. It is reduced by more than kEqualDepth, so that equally
+/// near faces stay.
 PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   if (is_strip(face)) return 0.0f;
   const float lowest =
@@ -283,9 +283,9 @@ PICTURA_HD inline uint64_t samples_where_positive(float value, Vec2 gradient, Ve
   return samples_inside(edge, -edge.x0, -edge.y0);
 }
 
-/// Returns the shared samples at which a is in front of b, a face of another primitive. Usually, the centroid decides
-/// for all samples. If two solids intersect near the centroid and all_or_none is false, each sample is decided
-/// separately, by the rule of is_in_front().
+/// Returns the shared samples at which face `a` is in front of `b`. The faces belong to different primitives. Usually,
+/// the centroid decides for all samples. If two solids intersect near the centroid and all_or_none is false, each
+/// sample is decided separately, by the rule of is_in_front().
 template <typename Stands>
 PICTURA_HD inline uint64_t samples_in_front(const ScreenFace& a, const ScreenFace& b, uint64_t shared, Vec2 corner,
                                             bool all_or_none, Stands&& stands) {

@@ -25,8 +25,8 @@ std::string hash_of_file(const std::string& path);
 /// Writes a file completely or not at all (output_file.h).
 void write_file(const std::string& path, std::string_view bytes);
 
-/// Returns the folder for cached files: $XDG_CACHE_HOME/pictura/NAME or ~/.cache/pictura/NAME. Empty without these
-/// variables, or if PICTURA_CACHE is `off`.
+/// Returns the folder for cached files: $XDG_CACHE_HOME/pictura/NAME or ~/.cache/pictura/NAME. Empty if neither
+/// XDG_CACHE_HOME nor HOME is set, or if PICTURA_CACHE is `off`.
 std::string cache_folder(const std::string& name);
 
 /// Returns the bytes of a cached file, or nothing if it is missing. Throws as read_file() does, and Error for FIFOs and

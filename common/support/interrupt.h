@@ -22,7 +22,7 @@ void clear_interrupt();
 inline bool interrupted() { return interrupting_signal() != 0; }
 void throw_if_interrupted();
 
-/// Work that a signal interrupts. Work that begins after the signal belongs to an orderly end, and is not interrupted.
+/// Work that a signal interrupts. Work that begins after the signal is part of the shutdown, and is not interrupted.
 class InterruptibleWork {
  public:
   explicit InterruptibleWork(std::string message) : message_(std::move(message)) {}

@@ -49,8 +49,8 @@ class OutputFile {
   /// Descriptor of the stored bytes: a seekable regular file, open for reading and writing.
   int fd() const { return staged_.get(); }
 
-  /// Syncs the bytes to disk, and makes them the target's content. Waits for a FIFO's reader. Throws Error, and
-  /// Interrupted if a signal ends the wait.
+  /// Syncs the bytes to disk, and makes them the target's content. Waits for a FIFO's reader. Throws Error if this
+  /// fails, and Interrupted if a signal ends the wait.
   void commit();
 
  private:

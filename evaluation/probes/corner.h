@@ -1,5 +1,5 @@
 // Probe of blind corners (paper, "Closed-loop driving reveals occlusion-aware behavior"). It compares how policies
-// approach corners with a hidden vehicle and empty corners.
+// approach corners with and without a hidden vehicle.
 #pragma once
 
 #include "pictura/evaluation/probes/corner_results.h"

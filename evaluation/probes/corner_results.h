@@ -25,7 +25,7 @@ constexpr std::array<const char*, 2> kWallNames{"on", "off"};  // with and witho
 
 /// Vehicle that CornerCase::removed lacks.
 enum class CornerControl : uint8_t {
-  none,       // the hidden vehicle
+  none,       // no control: the hidden vehicle
   permuted,   // control: another vehicle near the ego, drawn at random; none if there is no other
   untrained,  // control: the hidden vehicle; the policies have fresh weights
 };
@@ -72,7 +72,7 @@ std::optional<Reveal> reveal_of(const CornerResults& results, size_t pair, bool 
 /// hidden runs with walls. Returns the first pair if no pair has a reveal for every policy.
 size_t example_of(const CornerResults& results);
 
-/// Measures at the reveal, by their names in files.
+/// Means of Reveal's values. Members have their names in files.
 struct CornerMeasures {
   Estimate distance_m, corner_m, speed_mps, approach_mps, deceleration_mps2;
 };

@@ -53,9 +53,9 @@ struct CornerPair {
 };
 /// Tolerances of similar states.
 constexpr float kSameDistance_m = 1, kSameSpeed_mps = 0.5f;
-/// Returns at most `count` pairs of similar states with different egos or scenes, ordered by hidden state. Takes pairs
-/// from all scenes in turn. Uses only the first state of an ego and hidden vehicle, and only the most similar state of
-/// an ego at an empty corner.
+/// Returns at most `count` pairs of similar states, ordered by hidden state. The two states of a pair have different
+/// egos or scenes. Takes pairs from all scenes in turn. Uses the first state of each ego with a hidden vehicle. Uses
+/// each ego's approach to an empty corner once, in the state most similar to the hidden state.
 std::vector<CornerPair> match_corners(const std::vector<CornerState>& hidden, const std::vector<CornerState>& empty,
                                       int64_t count);
 

@@ -55,8 +55,8 @@ struct ProbeResults {
   const PairedResponse& response(size_t one, size_t policy) const { return responses[one * policies.size() + policy]; }
 };
 
-/// Mean responses of one policy. An estimate is the mean of the scenes' means, with a 95 % interval; infinite without
-/// scenes.
+/// Mean responses of one policy. An estimate is the mean of the scenes' means, with a 95 % interval; both are infinite
+/// without scenes.
 struct ResponseMeans {
   int64_t cases = 0;
   int scenes = 0;  // number of scenes with cases

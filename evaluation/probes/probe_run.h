@@ -49,7 +49,7 @@ struct ProbeFrame {
   }
 };
 
-/// Host scene of worlds from frames of any steps.
+/// Scene on the host. Its worlds may come from frames of different steps.
 struct KeptScene {
   std::vector<int32_t> world_begin{0}, light_begin{0}, hidden;
   std::vector<AgentBox> boxes;
@@ -79,8 +79,8 @@ struct ProbePair {
   int32_t measured_box = -1;  // box whose visibility is measured; -1: none (NaN)
 };
 
-/// Cases still to be drawn. Scenes differ by at most one case. A scene's cases spread evenly over its samples if every
-/// sample offers enough.
+/// Cases still to be drawn. Scenes' numbers of cases differ by at most one. A scene's cases spread evenly over its
+/// samples if every sample offers enough.
 class CaseQuota {
  public:
   CaseQuota(int64_t cases, const ProbeOptions& options) : cases_(cases), options_(options) {}

@@ -30,8 +30,8 @@ void visit_options(RemovalOptions& options, Visitor&& v) {
            options.control, kRemovalControlNames);
 }
 
-/// Drives the worlds of evaluate() with these scenario numbers. All worlds have the first policy's population, walls
-/// and conditioning. Draws distinct pairs of an ego and a user every `sample_steps` steps. The ego is an active
+/// Drives the worlds that evaluate() would drive with options.worlds. All worlds have the first policy's population,
+/// walls and conditioning. Draws distinct pairs of an ego and a user every `sample_steps` steps. The ego is an active
 /// vehicle; the user is another active or halted agent within range_m. Each policy gets two inputs, with and without
 /// the user: vectors from Simulator::observe, images from a view. Occlusion is measured by ProbeRun::visibility(). An
 /// interrupt ends the probe with the completed cases. Throws UsageError if the number of scenes is not a multiple of

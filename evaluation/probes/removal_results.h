@@ -62,8 +62,8 @@ struct RemovalRow : ResponseMeans {
   double mean_occlusion = 0;  // NaN outside all frames
 };
 
-/// Returns for each policy rows of all distances, then of each distance band. Each set has one row per bin, and last
-/// the users outside all frames.
+/// Returns for each policy rows of all distances, then of each distance band. Rows ascend by bin; users outside all
+/// frames come last.
 std::vector<RemovalRow> summarize(const RemovalResults& results);
 
 /// Writes a CSV row per case, which ends with the columns of response_header(). Throws Error naming the path.

@@ -73,7 +73,7 @@ class TakeoverWorlds {
   const ProbeOptions& options_;
   const std::vector<LineOfSight>& sights_;
   CompiledMaps open_maps_;  // without walls
-  // Key: has walls; observes auxiliary slots, entities, and walls.
+  // Key: walls, and whether auxiliary slots, vectors and walls are observed.
   std::map<std::array<bool, 4>, std::unique_ptr<Worlds>> worlds_;
 };
 

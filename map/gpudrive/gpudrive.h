@@ -10,7 +10,7 @@
 namespace pictura::gpudrive {
 
 /// Throws Error "SOURCE: objects[3].position[17].x: expected ..., got ..." for faults: text other than JSON, missing
-/// fields, other types, and valid states or points that are not finite.
+/// fields, other types, and non-finite numbers in points or in states flagged valid.
 LoggedScene parse_scene(std::string_view text, const std::string& source);
 
 }  // namespace pictura::gpudrive

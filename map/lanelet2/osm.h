@@ -20,7 +20,7 @@
 
 namespace pictura::lanelet2 {
 
-/// Returns the truth value that Lanelet2 reads, or nullopt for other texts.
+/// Returns true for "yes", "true" and "1", false for "no", "false" and "0", and nullopt for other texts.
 std::optional<bool> flag_of(std::string_view value);
 
 /// Tags of an element, in the order of the file. The document must outlive them.

@@ -21,8 +21,8 @@ void measure(PlaneCubic* cubic);
 /// Fills the integration panels of a spiral. Does nothing for other pieces.
 void measure(GeometryPiece* piece);
 
-/// Returns the pose at distance `ds` from the start of a piece. Spirals require an earlier measure(). Plane cubics are
-/// parametrised by arc length, scaled to end at the piece's end.
+/// Returns the pose at distance `ds` from the start of a piece. Spirals require an earlier measure(). On plane cubics,
+/// ds / length of the piece is the fraction of the cubic's arc length.
 Pose pose_on(const GeometryPiece& piece, double ds);
 
 /// Clamps s to the road.

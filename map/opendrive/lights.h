@@ -14,8 +14,8 @@ inline constexpr std::string_view kLightType = "1000001";
 bool applies_to(const FileLane& lane, const FileRoad& road, Orientation orientation,
                 const std::vector<LaneRange>& validity);
 
-/// Splits sections at the stop lines of lights without a controller whose lanes do not lead to a junction. Heads of one
-/// orientation within 20 m share the stop line of the head that traffic reaches first.
+/// Splits sections at the stop lines of lights that have no controller and whose lanes do not lead to a junction. Heads
+/// of one orientation within 20 m share the stop line of the head that traffic reaches first.
 void split_at_lights(Network* network);
 
 }  // namespace pictura::opendrive

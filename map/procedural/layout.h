@@ -98,7 +98,7 @@ class Layout {
   double end_height_m(int street, bool at_start) const;
   /// Whether traffic that arrives on this arm has a right-turn lane (slip lane).
   bool has_slip(const Arm& arm) const;
-  /// Returns the maximum number of lanes per direction, which a roundabout's circle has.
+  /// Returns the largest number of lanes per direction of the node's streets. A roundabout's circle has as many lanes.
   int max_lanes_of(const Node& node) const;
 
  private:

@@ -1,6 +1,6 @@
 // Importer of PufferDrive's little-endian scenes: v1 (of 2025), v2 (of PufferDrive 2.0, with or without a leading
-// scenario id) and v3c (of PufferDrive 3.0, and of 123Drive from version 0.3 on). The files have no version, so the
-// importer takes the layout that fits to the last byte.
+// scenario id) and v3c (of PufferDrive 3.0, and of 123Drive from version 0.3 on). The files do not state their version,
+// so the importer takes the layout that uses exactly all bytes.
 #pragma once
 
 #include <string>

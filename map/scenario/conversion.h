@@ -33,7 +33,8 @@ struct Conversion {
     if (remaining_work < 0) fail("{}: its map exceeds the work limit of a scene", scene.source);
   }
   Eigen::Vector3d from_origin(const Eigen::Vector3d& p) const { return p - origin; }
-  /// Rounds points of authored scenes as a map does, so that scene_of_scenario() returns the same points.
+  /// Rounds points of authored scenes (LoggedScene::is_authored) to a map's floats, so that scene_of_scenario() returns
+  /// the same points.
   Eigen::Vector3d rounded(const Eigen::Vector3d& p) const {
     if (!scene.is_authored) return p;
     const Eigen::Vector3d stated_again = origin + p.cast<float>().cast<double>();

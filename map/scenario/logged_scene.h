@@ -127,9 +127,9 @@ struct LoggedScene {
   std::vector<LoggedStopSign> stop_signs;
   std::vector<LoggedLight> lights;
   bool has_links = true;  // if false, lanes are linked where their ends meet
-  /// Whether a program wrote the scene. Then nothing is inferred: types, links, edges and groups of lights are used as
-  /// they are. Points are rounded to the precision of a map, so scene_of_scenario() followed by
-  /// make_scenario() returns the same scenario.
+  /// Whether the scene is authored: made by a caller (Scenario.from_arrays) or by scene_of_scenario(), not read from a
+  /// dataset. Then nothing is inferred: types, links, edges and groups of lights are used as they are. Points are
+  /// rounded to the precision of a map, so scene_of_scenario() followed by make_scenario() returns the same scenario.
   bool is_authored = false;
   double tolerance_m = 0.02;                // maximum deviation of thinned polylines; 0: no thinning
   std::optional<Eigen::Vector3d> origin_m;  // by default the centre of lanes and edges

@@ -57,7 +57,7 @@ PICTURA_HD RoadSide road_side(Span<const SideEdge> edges, const GridView& cells,
     if (neighbor >= 0) normal = normal + edges[neighbor].left;
     best = {index, distance_m, dot(away, normal) <= 0.0f};
   };
-  // Small areas are searched first, because most edges are near.
+  // Small areas are searched first, because the nearest edge is usually near.
   const float reaches_m[] = {5.0f, 15.0f, kRoadSideReach_m};
   for (const float reach_m : reaches_m) {
     const CellRows range = cells_around(cells, p, reach_m);

@@ -97,7 +97,7 @@ struct Scenario {
   std::vector<int32_t> light_lanes;
   std::vector<RecordedLightState> light_states;  // [lights * num_steps]
   std::vector<ConversionNote> notes;
-  int32_t repaired_headings = 0;  // number of first headings that protocol_scene() replaced
+  int32_t repaired_headings = 0;  // number of tracks whose first heading protocol_scene() replaced
 
   Span<const TrackState> states_of(int32_t track) const {
     return {states.data() + first_of(track), static_cast<size_t>(num_steps)};

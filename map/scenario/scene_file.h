@@ -19,8 +19,8 @@ FieldFileKind scene_file_kind();
 /// names the file, on failure.
 void write_scene_file(const std::string& path, const Scenario& scenario);
 
-/// Parses and validates. Throws Error "NAME: reason" for foreign, truncated or damaged bytes, and for files of versions
-/// with other fields.
+/// Parses and validates. Throws Error "NAME: reason" for foreign, truncated or damaged bytes, and for files of a
+/// pictura version whose scenes have other fields.
 Scenario parse_scene_file(std::string_view bytes, const std::string& name);
 
 }  // namespace pictura

@@ -79,7 +79,7 @@ PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t>
 /// Test whether the policy is evaluated for a slot.
 struct DecidingSlots {
   const AgentStatus* status;
-  Span<const uint8_t> mask;  // [slots] 0: excluded; empty: none is
+  Span<const uint8_t> mask;  // [slots] 0: excluded; empty: no slot is excluded
   const uint8_t* left;       // [slots] 1: just left the map, and is included; or null
 
   PICTURA_HD bool operator()(int64_t slot) const {

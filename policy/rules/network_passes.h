@@ -35,8 +35,8 @@ struct SegmentColumn {
   static constexpr int kCos = 4, kSin = 5;  // direction of the segment
 };
 
-/// Features of a row (policy/row_features.h). A row begins with `points` pairs (x, y), with kOfPoint features each;
-/// of_segment adds kOfSegment features.
+/// Features of a row (policy/row_features.h). A row begins with `points` pairs (x, y). Each pair has kOfPoint features;
+/// of_segment adds kOfSegment.
 struct RowFeatures {
   int points = 0;
   bool of_segment = false;
@@ -82,7 +82,7 @@ PICTURA_HD inline float row_feature(const RowFeatures& features, const float* ro
 struct SetSize {
   RowSize members;  // max_members rows per set; keeps_rows is true
   int64_t max_members = 0;
-  int64_t counts_stride = 1;  // distance of sets' counts in elements
+  int64_t counts_stride = 1;  // elements from one set's count to the next
   bool has_norm = false;
   static constexpr int kChannels = 64, kMaxWidth = 32, kMaxMembers = 254, kNoMember = 255;
   PICTURA_HD int64_t sets() const { return members.rows / max_members; }
@@ -101,7 +101,7 @@ struct SetParameters {
   Number *hidden_weight, *hidden_bias, *weight, *bias;
 };
 
-/// Size of attention scores [matrices, tokens, columns], with even columns.
+/// Size of attention scores [matrices, tokens, columns]. The number of columns is even.
 struct TokenSize {
   ActivationType type = ActivationType::f32;
   int64_t matrices = 0, tokens = 0, columns = 0;

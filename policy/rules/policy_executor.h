@@ -16,7 +16,7 @@ class PolicyExecutor {
   PolicyExecutor& operator=(const PolicyExecutor&) = delete;
 
   virtual Device device() const = 0;
-  /// Free memory of a device, or all memory of the host, where file caches can be freed.
+  /// Free memory of a device; all memory of the host, because file caches can be freed.
   virtual int64_t memory_bytes() const = 0;
 
   /// Writes the slots for which asked(slot) is true, ascending, and returns their number. slots_out has room for all

@@ -75,8 +75,8 @@ PICTURA_HD inline bool collide(const AgentBox& a_from, const AgentBox& a_to, con
 }
 
 /// Whether an agent is at fault for a collision (paper). An agent that is almost at rest or struck from behind is not
-/// at fault. A reversing agent is never struck from behind. Another agent is struck from behind if the other box's
-/// nearer end was behind its rear bumper before the step. own_speed_mps is the speed in the step.
+/// at fault. A reversing agent is never struck from behind. A forward-moving agent is struck from behind if the other
+/// box's nearer end was behind the agent's rear bumper before the step. own_speed_mps is the speed in the step.
 PICTURA_HD inline bool at_fault(const AgentBox& own_before, float own_speed_mps, const AgentBox& other_before) {
   constexpr float kStopped_mps = 0.2f;
   if (fabsf(own_speed_mps) < kStopped_mps) return false;

@@ -28,7 +28,7 @@ PICTURA_HD constexpr Controls controls_of_action(int action) {
   return {jerk_long[action / kNumLatActions], jerk_lat[action % kNumLatActions]};
 }
 
-/// Multipliers from the agent's conditioning, wheelbase, and options.
+/// Multipliers (from the agent's conditioning), wheelbase and options.
 struct DynamicsParameters {
   float throttle = 1, steer = 1, acceleration = 1;
   float wheelbase_m = 2.7f;

@@ -1,5 +1,5 @@
-// Ego frame of an agent's observations: origin at the reference point, x forward, y to the left. Also scales
-// (docs/reference/observation.md) and the visible part of the map.
+// Ego frame of an agent's observations: origin at the reference point, x forward, y to the left. Also contains the
+// scales (docs/reference/observation.md) and the visible part of the map.
 #pragma once
 
 #include "pictura/simulator/rules/map_view.h"

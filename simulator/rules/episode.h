@@ -29,8 +29,8 @@ PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& co
   return is_valid(command) && (has_record(world.map) || !is_follow_record_command(command));
 }
 
-/// Whether a step is counted and used for learning. The agent must take an action or a kinematic state, and be neither
-/// impaired nor driven by another policy.
+/// Whether a step is counted and used for learning. The agent must obey an action or a kinematic_state command, and be
+/// neither impaired nor driven by another policy.
 template <typename CommandType>
 PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType& command) {
   return takes_actions(world, agent) && !is_leave_command(command) && !is_follow_record_command(command) &&
@@ -121,7 +121,7 @@ PICTURA_HD inline bool episode_ends(const WorldView& world, int steps, int spawn
   return inactive >= world.options.reset_inactive_fraction * static_cast<float>(spawned);
 }
 
-/// Finishes an agent's step, with which the episode may end (`ends`). Sets `truncated` for agents that are active at
+/// Finishes an agent's step. `ends`: the episode ends with this step. Sets `truncated` for agents that are active at
 /// the episode's end or have left. Counts finished episodes and lives.
 PICTURA_HD inline void finish_agent(const WorldView& world, int agent, bool ends, const StepArrays& results,
                                     SimulatorTotals* totals_inout) {

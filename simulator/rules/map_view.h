@@ -55,8 +55,8 @@ struct Exit {
   float slope = 0;  // rise per metre
 };
 
-/// Lane at whose start agents enter an open map. In each step, only one agent can enter through close entries, which
-/// have the same `turn`.
+/// Lane at whose start agents enter an open map. Entries close to each other have the same `turn`; in each step, only
+/// one agent can enter through them.
 struct Entry {
   int32_t lane = 0, turn = 0;
 };
@@ -133,7 +133,7 @@ struct MapView {
   Span<const Barrier> edges, walls;
   Span<const StopLine> stop_lines;
   Span<const int32_t> spawn_lanes;
-  Span<const float> spawn_end_m;  // [spawn_lanes] running sum of lengths; on open maps, only far from route ends
+  Span<const float> spawn_end_m;  // [spawn_lanes] running sum of lengths; on open maps, without parts near route ends
   Span<const Exit> exits;
   Span<const Entry> entries;
   GridView exit_cells;
@@ -154,7 +154,7 @@ struct MapView {
   GridView side_cells;
   Span<const LightState> recorded_lights;  // [stop_lines, recorded_steps]; if empty, LightPlans apply
   int32_t recorded_steps = 0;              // from the start of episodes
-  // Above 0: recorded_agents from this index on are replayed tracks, boxes like parked cars.
+  // If above 0: recorded_agents from this index on are replayed tracks, whose boxes take the places of parked cars.
   int32_t first_replayed = 0;
   float max_box_radius_m = 0, max_speed_mps = 0;  // half-diagonal of boxes
   uint8_t is_open = 0;                            // 1: an open map, whose roads end

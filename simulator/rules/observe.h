@@ -297,7 +297,7 @@ struct StepObservation {
   }
 };
 
-/// Writes one entity set: empty if hidden, and for agents that are absent or halted in an earlier step.
+/// Writes one entity set. It is empty if it is hidden, or if the agent is absent or was halted in an earlier step.
 template <typename Observation>
 PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& place, EntitySet set,
                             const SetRows& out, const Observation& observation) {

@@ -9,7 +9,8 @@ namespace pictura {
 /// Values of goal_chains on maps with a record, where an agent has only one goal.
 constexpr int32_t kRecordedGoal = 1, kRecordedGoalReached = 2;
 
-/// Returns the state `step` steps after the episode's start. After the record's end, it is the last state with speed 0.
+/// Returns the state `step` steps after the episode's start. After the record's end, it is the last state, but with its
+/// speed set to 0.
 PICTURA_HD inline RecordedState recorded_state(const MapView& map, int agent, int step) {
   const int last = map.recorded_steps - 1;
   RecordedState state = map.recorded_states[static_cast<size_t>(agent) * static_cast<size_t>(map.recorded_steps) +
@@ -56,9 +57,9 @@ PICTURA_HD inline void leave(const WorldView& world, int agent) {
   remove_box(world, agent);
 }
 
-/// Places an agent at its recorded state `step` steps after the episode's start, or removes it without such a state. An
-/// agent that did not follow its record before is not tested for collisions on the way. Only the first thread of the
-/// group writes.
+/// Places an agent at its recorded state `step` steps after the episode's start, or removes it if there is no such
+/// state. An agent that did not follow its record before is not tested for collisions on the way. Only the first thread
+/// of the group writes.
 template <typename ThreadGroup>
 PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;

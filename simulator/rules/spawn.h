@@ -285,7 +285,7 @@ PICTURA_HD inline AgentBox spawn_box(const WorldView& world, int agent, int i) {
   return box_at(world.agents, world.first_slot + agent, pose.position_m, sincos_of(pose.heading_rad));
 }
 
-/// A box must touch no barrier and have its centre on the road. A pedestrian's box must only touch no wall.
+/// A box must touch no barrier and have its centre on the road. A pedestrian's box need only be clear of walls.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD bool fits_map(const MapView& map, const AgentBox& box, const ThreadGroup& group = {}) {
   if (box.agent_class == AgentClass::pedestrian) return !touches_wall(map, box, group);

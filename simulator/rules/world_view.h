@@ -118,7 +118,7 @@ PICTURA_HD inline AgentBox box_at(const AgentStateView& agents, int slot, Vec3 p
 
 constexpr uint8_t kHaltedPalette = 1;
 
-/// A box without a body is neither drawn nor part of collisions.
+/// The box of an agent without a body is neither drawn nor part of collisions.
 PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
   const AgentStatus status = agents.status[slot];
   AgentBox box = box_at(agents, slot, {agents.x_m[slot], agents.y_m[slot], agents.z_m[slot]},

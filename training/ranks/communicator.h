@@ -35,7 +35,7 @@ class Communicator {
   virtual void max(const at::Tensor& tensor) = 0;
   /// Copies rank `root`'s tensor to all.
   virtual void broadcast(const at::Tensor& tensor, int root) = 0;
-  /// Counts a step where collective operations are far apart, see Ranks::step().
+  /// Counts a step, see Ranks::step(). Call it where collective operations are far apart.
   virtual void step() = 0;
 
   double max_of(double value);

@@ -62,7 +62,7 @@ static_assert(kLaneFeatures == 7 && kBoundaryFeatures == 7 && kWallFeatures == 7
 /// Writes the pieces with indices `chosen` into a set of `capacity` rows.
 PICTURA_HD inline void write_pieces(Span<const ObservedPiece> pieces, const int32_t* chosen, int count, int capacity,
                                     const RowFrame& frame, float* rows_out) {
-  // write_piece() writes a zero behind the row, where the set's last row has no room.
+  // write_piece() writes a zero behind the row; behind the set's last row there is no room for it.
   const int num_followed = min_of(count, capacity - 1);
   for (int i = 0; i < num_followed; ++i, rows_out += kLaneFeatures) {
     write_piece(pieces[chosen[i]], frame, rows_out);
