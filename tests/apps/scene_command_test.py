@@ -141,9 +141,17 @@ with tempfile.TemporaryDirectory() as name:
         assert (report["scenes"], report["scored"], report["without_drivers"]) == (6, 5, 0), report
         assert len(report["faults"]) == 1 and report["rules"]["overlapping"] == "replay"
         assert report["repaired_headings"] == 0, report
-        repairs = (*words, "--density", "100", "--steps", 1, "--rule", "max_first_turn_deg=0.0001")
-        repaired = json.loads(run(*repairs, "--json", command="evaluate").stdout)["repaired_headings"]
-        assert repaired > 0 and f"{repaired} first headings repaired" in run(*repairs, command="evaluate").stdout
+        turned = json.loads((folder / "gpudrive.json").read_text())
+        for road_user in turned["objects"][:2]:
+            road_user["heading"][road_user["valid"].index(True)] += 1
+        (folder / "turned.json").write_text(json.dumps(turned))
+        repairs = (
+            "--policy", "idm", "--protocol", "womd", "--scenes", folder / "turned.json", "--threads", 1, "--density", "100",
+            "--steps", 1, "--rule", "max_first_turn_deg=10",
+        )  # fmt: skip
+        assert json.loads(run(*repairs, "--json", command="evaluate").stdout)["repaired_headings"] == 2
+        assert "2 first headings repaired" in run(*repairs, command="evaluate").stdout
+        (folder / "turned.json").unlink()
         assert [row["density"] for row in report["rows"]] == [1, 0.75, 0.5]
         assert report["rows"][0]["vehicle_episodes"] > report["rows"][2]["vehicle_episodes"] > 0
         rows = (folder / "agents.csv").read_text().splitlines()
