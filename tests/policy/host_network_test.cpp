@@ -162,8 +162,7 @@ TEST_P(ReleasedPolicy, HoldsActionsAsTorchsDoes) {
   EXPECT_LT(changed, static_cast<int>(slots) * 3);
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, ReleasedPolicy,
-                         ::testing::Values("perspective", "vector", "vector_auxiliary"),
+INSTANTIATE_TEST_SUITE_P(Models, ReleasedPolicy, ::testing::Values("perspective", "vector", "vector_auxiliary"),
                          [](const auto& model) { return model.param; });
 
 TEST(ReleasedPolicies, AreAllTested) {
