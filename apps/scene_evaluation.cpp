@@ -40,8 +40,8 @@ void print_table(const SceneEvaluation& evaluation) {
   const SceneProtocol& protocol = evaluation.results.protocol;
   print_settings(protocol);
   const SceneResults& results = evaluation.results;
-  print_result("{} scenes: {} scored, {} without a road user to drive, {} faults\n", evaluation.found,
-               results.scored(), results.without_drivers, evaluation.faults().size());
+  print_result("{} scenes: {} scored, {} without a road user to drive, {} faults\n", evaluation.found, results.scored(),
+               results.without_drivers, evaluation.faults().size());
   if (results.repaired_headings > 0) print_result("{} first headings repaired\n", results.repaired_headings);
   print_result("\n");
   constexpr const char* kLine = "{:8} {:34} {:>8} {:>9} {:>17} {:>17} {:>17} {:>17} {:>17} {:>9}\n";

@@ -110,7 +110,7 @@ RobustReport evaluate_robust(const RobustOptions& options) {
   evaluation.steps = kRobustSteps;
   evaluation.light_cycles = LightCycles::independent;
   evaluation.light_heads = LightHeads::visible;  // cameras at the stop line must see them
-  evaluation.densities = {Density::light};  // agents_per_world replaces its number of agents
+  evaluation.densities = {Density::light};       // agents_per_world replaces its number of agents
   for (RobustRow& row : report.rows) {
     if (!applies(row)) continue;
     if (options.on_progress) evaluation.on_progress = progress_of_part(options.on_progress, finished, num_driven);

@@ -48,8 +48,8 @@ std::vector<int32_t> takeovers(const CompiledMap& map, const SceneProtocol& prot
   return steps;
 }
 
-/// Replaces the first heading of tracks, from start_step on, that turn by more than this to the next step. Counts them in
-/// Scenario::repaired_headings.
+/// Replaces the first heading of tracks, from start_step on, that turn by more than this to the next step. Counts them
+/// in Scenario::repaired_headings.
 void repair_first_headings(int32_t start_step, float max_turn_deg, Scenario* scenario_inout) {
   for (size_t track = 0; track < scenario_inout->tracks.size(); ++track) {
     const Span<const uint8_t> valid = scenario_inout->valid_of(static_cast<int32_t>(track));
