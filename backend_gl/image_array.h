@@ -31,11 +31,12 @@ class ImageArray {
 
   /// Returns the number of allocated images, which the driver and a fixed maximum may limit.
   int reserve(int64_t images, PixelFormat format);
-  /// Clears all layers, the new render target.
+  /// Makes the layers the render target, and clears them.
   void begin();
   /// Averages the first `images` layers into the buffer.
   void resolve(int images);
-  /// Appends copies to `out` of `images` images from `first` on. stride: values from one image to the next.
+  /// Appends to *copies_out the copies of images [first, first + images) to `out`. stride: values from one image to the
+  /// next.
   void plan_copy(int first, int images, void* out, int64_t stride, std::vector<RowCopy>* copies_out) const;
   /// Copies to the host are finished when the call returns; copies to a device are enqueued.
   void copy(Span<const RowCopy> copies, Stream stream);

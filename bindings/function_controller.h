@@ -21,14 +21,15 @@ std::string name_of_function(const py::function& function);
 /// Returns a function that makes controllers, which call function(observations) with a dict of NumPy arrays [agents,
 /// ...]. `function` returns actions, int [agents], or logits [agents, kNumActions] and values [agents]. argmax and seed
 /// choose actions from logits. A renderer adds images: `rgb`, u8 [agents, cameras, 3, height, width], black for
-/// inactive agents; `rgb_0`, `rgb_1`, ... for several sizes. Controllers throw Error outside host memory, UsageError
-/// for other results, and exceptions of the function.
+/// inactive agents; `rgb_0`, `rgb_1`, ... for several sizes. The returned function throws Error unless the simulator is
+/// on the host; controllers throw UsageError for invalid results of `function`, and its exceptions.
 std::function<std::unique_ptr<Controller>(const DriverOptions&, const Simulator&, Renderer*)> function_controllers(
     const py::function& function);
 
-/// Returns a function that makes sessions with such a function as the policy, on the host, with the default
-/// configuration and the options' cameras. If the function returns actions, the chosen one has probability 1 and the
-/// value is NaN. Throws UsageError for another device or decision_steps. Sessions throw as controllers do.
+/// Returns a function that makes sessions on the host. Their policy is `function`, with the default configuration and
+/// the options' cameras. If the function returns actions, the chosen one has probability 1 and the value is NaN. The
+/// returned function throws UsageError for devices other than the host, or if decision_steps is positive. Sessions
+/// throw as controllers do.
 std::function<std::unique_ptr<PolicySession>(const DriverOptions&)> function_sessions(const py::function& function);
 
 }  // namespace pictura::python

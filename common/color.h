@@ -33,7 +33,7 @@ constexpr int kNumBoxFaces = 5;
 constexpr float kVisibleRange_m = 120.0f;
 
 PICTURA_HD constexpr Rgb agent_color(AgentClass agent_class, BoxFace face) {
-  // Conditionals, because each thread of a kernel would build a table in local memory.
+  // No table, because each thread of a kernel would build it in local memory.
   auto chosen = [face](Rgb front, Rgb back, Rgb left, Rgb right, Rgb top) {
     const Rgb of_sides = face == BoxFace::left ? left : face == BoxFace::right ? right : top;
     return face == BoxFace::front ? front : face == BoxFace::back ? back : of_sides;

@@ -12,7 +12,7 @@ class Grid {
  public:
   Grid() = default;
   /// Puts item i into every cell that boxes[i] touches. Throws Error if cell_m is not positive or a box is not finite.
-  /// Also throws for more than 2^26 cells or 2^27 entries of cells.
+  /// Also throws for more than 2^26 cells, or more than 2^27 items summed over the cells.
   Grid(Span<const Aabb2> boxes, float cell_m);
   GridView view() const { return {origin_m_, cell_m_, num_x_, num_y_, begin_, items_}; }
   std::size_t num_boxes() const { return num_boxes_; }

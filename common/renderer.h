@@ -74,8 +74,8 @@ class Renderer {
   /// fit.
   ///
   /// On a CUDA device, a view's invalid world, handle, pose or range of hidden agents is a latched fault. The view's
-  /// images are then black. An invalid number of views is a latched fault and is clamped. Boxes, egos, and whether
-  /// world_begin and light_begin ascend are not checked there.
+  /// images are then black. An invalid number of views is a latched fault and is clamped. On a CUDA device, boxes, egos
+  /// and the order of world_begin and light_begin are not checked.
   virtual void render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out,
                       Stream stream = {}) = 0;
 

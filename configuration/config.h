@@ -34,7 +34,7 @@ struct Config {
 /// key or value.
 Config parse_config(const std::string& text, const std::string& source, const std::vector<std::string>& overrides = {});
 
-/// Reads a configuration that a run saved, possibly of another build. It may name any backend.
+/// Reads a configuration that a run, possibly of another build, saved. It may name any backend.
 Config parse_saved_config(const std::string& text, const std::string& source);
 
 /// Reads a file. In the file, relative paths (see visit_paths()) start at the file's folder. In overrides and in the

@@ -48,7 +48,7 @@ std::vector<std::string> draw_contact_sheets(const HostImages& images, const Rig
 /// Returns an image above its caption, enlarged by an integer factor to about 480 px width.
 RgbImage captioned(const HostImages& images, int view, int camera, const std::string& caption);
 
-/// Copies a picture to a place entirely inside a larger one.
+/// Copies a picture into a larger one, which must contain it entirely.
 void paste(const RgbImage& picture, int left_px, int top_px, RgbImage* image_out);
 
 /// Arranges pictures in rows of three. Throws Error if the list is empty or sizes differ.

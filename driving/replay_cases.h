@@ -21,9 +21,9 @@ struct CaseReplayOptions {
 /// Throws UsageError if the case number is not below `count`. Before a probe, `count` is the maximum number of cases.
 void check_case_number(const CaseReplayOptions& options, int64_t count);
 
-/// Simulates the case's scene again on the host, with its driver and the first policy's world. Reports the file on
-/// stderr, and the ego's speed if it differs from that in the probe. Without a number, chooses the case that changes
-/// the first policy's value most. Throws UsageError if the case does not exist.
+/// Simulates the case's scene again on the host, with the scene's driver and the first policy's world configuration.
+/// Reports the file on stderr, and the ego's speed if it differs from that in the probe. Without a number, chooses the
+/// case that changes the first policy's value most. Throws UsageError if the case does not exist.
 void write_case_replay(const CaseReplayOptions& options, const RemovalOptions& probe, const RemovalResults& results);
 void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions& probe,
                        const PedestrianResults& results);

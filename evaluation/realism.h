@@ -100,8 +100,8 @@ class RealismScene {
 /// Returns [steps]: log-likelihoods of recorded values under the histogram of the simulated values. A recorded NaN
 /// gives NaN. Simulated NaNs are ignored; if all are NaN, the results are NaN.
 std::vector<double> log_likelihoods(const RealismTerm& term, Span<const double> recorded, Span<const double> simulated);
-/// Returns the log-likelihood of a recording with (`recorded`) or without an event. `count` of the rollouts have the
-/// event.
+/// Returns the log-likelihood of an event, or of its absence if the recording lacks it (`recorded` is false). `count`
+/// of the rollouts have the event.
 double event_log_likelihood(const RealismTerm& term, bool recorded, int count, int rollouts);
 
 /// Scores of many scenes.

@@ -77,8 +77,8 @@ struct DensityResult {
   int first_scenario = 0;
   std::vector<ScenarioCounts> scenarios;
   std::string driver;  // as in EvaluateOptions::others; empty: the evaluated driver
-  // [scenarios] agent with the most severe infraction; 0: none. At-fault collisions rank before off-road and red
-  // lights. Files lack this field.
+  // [scenarios] agent with the most severe infraction; 0 also if there is none. At-fault collisions rank before
+  // off-road and red lights. Files lack this field.
   std::vector<int> worst_agents;
 };
 

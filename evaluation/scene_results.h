@@ -44,7 +44,7 @@ struct SceneCounts {
 struct SceneResults {
   EvaluationSetting setting;  // `maps` holds SceneEvaluateOptions::scenes
   SceneProtocol protocol;
-  // Files that are unreadable wholly or from some point on, with reasons; also those outside the range of scenes.
+  // Files that cannot be read wholly or in part, with reasons, even if they are outside the range of scenes.
   std::vector<std::string> unread;
   int first_scene = 0, num_scenes = 0;
   int without_drivers = 0;                       // excluded: all road users are parked or absent

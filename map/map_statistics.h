@@ -25,7 +25,7 @@ struct MapStatistics {
   // `steep_share` is the share of driving lanes steeper than kSteepGrade. `parking_share` is the length of parking
   // lanes divided by that of driving lanes outside junctions.
   double steep_share = 0, parking_share = 0;
-  // Numbers of junctions of 1 to 3, 4, 5, and more roads.
+  // Numbers of junctions by their number of roads: 1 to 3; 4; 5; more.
   std::array<int, 4> junctions_of_arms{};
   // Quantiles of the distances of light heads beyond their stop lines.
   std::array<double, 3> head_ahead_m{};

@@ -129,7 +129,7 @@ std::vector<CurvePoint> sample_curve(const CurveBreaks& curve, double tolerance_
   for (std::size_t i = 1; i < breaks.size(); ++i) {
     const double begin = dense.back().s, span = breaks[i] - begin;
     if (span <= 0) continue;
-    // Several equal steps per maximum length let thinned pieces be nearly that long.
+    // With several equal steps per maximum length, thinned pieces can be nearly as long as the maximum.
     const int steps = static_cast<int>(std::ceil(kStepsPerPiece * span / max_piece_m - kPieceRounding));
     low = begin;
     high = breaks[i];

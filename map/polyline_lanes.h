@@ -49,8 +49,8 @@ std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
 /// Finds junctions. Wanted lanes of different roads become junction lanes if they cross away from their ends. All
 /// junction lanes, including those marked before, get new junctions. Lanes that cross, fork or merge share a junction,
 /// named after the first lane's road. A positive bridged_m is for roads that are cut into many lanes. Successive
-/// junction lanes then share a junction. A wanted lane of at most bridged_m between junction lanes then joins their
-/// junction. Calls count_work(steps), so that the caller can limit the work.
+/// junction lanes then share a junction. A wanted lane between junction lanes then joins their junction if it is at
+/// most bridged_m long. Calls count_work(steps), so that the caller can limit the work.
 void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
                              const std::function<void(std::size_t)>& count_work, RoadMap* map);
 

@@ -61,7 +61,9 @@ struct Lane {
   int32_t left_neighbor = -1, right_neighbor = -1;  // driving or ramp, same direction; marks are ignored
   float length_m = 0;
   float speed_limit_mps = 0;
-  int32_t source_road = 0, source_section = 0, source_lane = 0;  // indices, and the id in the file
+  // Indices of the road and the section in the file. The lane is OpenDRIVE's lane id; in Lanelet2 it is 1, or -1
+  // against the lanelet.
+  int32_t source_road = 0, source_section = 0, source_lane = 0;
 };
 
 enum class MarkColor : uint8_t { white, yellow, red, green, blue, orange, violet, black };

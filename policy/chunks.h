@@ -1,4 +1,4 @@
-// Splits a batch into chunks of equal size for the network. On a device, only few different sizes occur. So cuDNN's
+// Splits a batch into chunks of equal size for the network. On a device, only a few different sizes occur. So cuDNN's
 // plans and CUDA graphs are rarely rebuilt when the number of active agents changes.
 #pragma once
 
@@ -40,7 +40,7 @@ struct Chunk {
   }
 };
 
-/// Calls f(const Chunk&) for all chunks of rows, i64 [n].
+/// Calls f(const Chunk&) for all chunks of `batch`, row numbers i64 [n].
 template <typename F>
 void for_each_chunk(const at::Tensor& batch, const ChunkSizes& sizes, const F& f) {
   const int64_t total = batch.size(0);

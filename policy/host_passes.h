@@ -9,7 +9,7 @@
 
 namespace pictura::host {
 
-/// Maximum number of activations in a block that fits a core's second-level cache with its results.
+/// Maximum number of activations in a block that fits, together with its results, into a core's second-level cache.
 constexpr int64_t kBlockNumbers = 48 * 1024;
 
 /// Computes out = GELU(x + bias) with the error function; the error is at most 2e-7 max(1, |x + bias|). slope_out gets
@@ -53,9 +53,9 @@ void member_rows(const float* members, const int32_t* counts, int64_t sets, int6
 void largest_members(const float* members, const int32_t* counts, int64_t sets, int64_t channels, float* largest_out,
                      int32_t* which_out);
 
-/// Backward pass of largest_members() and of the linear layer before it, from `activations` to `members`. Adds to the
-/// gradients of activations and weight. grad: [sets, channels]; which: [sets, channels], the largest member's row in
-/// `activations`, or -1; weight: [channels, hidden]; activations: [rows, hidden].
+/// Backward pass of largest_members() and of the linear layer before it, which maps `activations` to `members`. Adds to
+/// the gradients of activations and weight. grad: [sets, channels]; which: [sets, channels], the largest member's row
+/// in `activations`, or -1; weight: [channels, hidden]; activations: [rows, hidden].
 void largest_members_backward(const float* grad, const int32_t* which, int64_t sets, int64_t channels, int64_t hidden,
                               const float* weight, const float* activations, float* activations_grad_inout,
                               float* weight_grad_inout);

@@ -30,7 +30,8 @@ class ImageBackbone {
   void check_images(const Rig& rig) const;
 
   /// Returns feature maps [cameras * views, channels, rows, columns], channels last in memory, with one position per
-  /// patch. images: u8 [views, cameras, 3, height, width]; black pixels at the right and the bottom complete patches.
+  /// patch. images: u8 [views, cameras, 3, height, width]; black pixels are added at the right and the bottom to
+  /// complete patches.
   at::Tensor forward(const at::Tensor& images) const;
 
  private:

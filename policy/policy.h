@@ -1,5 +1,5 @@
-// The paper's vector and image policies (appendix, table of the policy architecture). They share a trunk with actor and
-// critic. The image encoder's output is as wide as that of the vector policy's entity set encoders.
+// The paper's vector and image policies (appendix, table of the policy architecture). Both have the same trunk, actor
+// and critic. The image encoder's output is as wide as that of the vector policy's entity set encoders.
 #pragma once
 
 #include <functional>

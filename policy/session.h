@@ -54,8 +54,9 @@ RendererConfig evaluation_renderer_config(const Config& config, const Rig& rig, 
 class PolicySession {
  public:
   /// Opens the policy of a checkpoint, or of a safetensors file of training or `pictura export`. Throws Error naming
-  /// the file if it is neither or truncated. Throws Error if its observation schema or architecture is not the current
-  /// one, or if this device cannot run the policy. Throws UsageError if the policy cannot use the options' cameras.
+  /// the file if it is neither of these or is truncated. Throws Error if its observation schema or architecture is not
+  /// the current one, or if this device cannot run the policy. Throws UsageError if the policy cannot use the options'
+  /// cameras.
   explicit PolicySession(const std::string& path, const SessionOptions& options = {});
   /// Wraps a policy, which must outlive the session, with cameras that are not randomized. Every call uses the current
   /// weights. Builds without torch lack this constructor.

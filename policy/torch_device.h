@@ -33,7 +33,7 @@ struct DeviceMemory {
 };
 DeviceMemory memory_of(Device device);
 
-/// Returns a device's free memory without torch's cache, or all memory of the host.
+/// Frees torch's cache, and returns the device's free memory, or all memory of the host.
 int64_t available_bytes(Device device);
 
 /// Returns a contiguous tensor's elements. Throws Error if they are not of type T.

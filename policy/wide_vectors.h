@@ -10,7 +10,7 @@
 #define PICTURA_WIDE
 #endif
 
-/// Attribute of a function that is compiled for the processor of its caller.
+/// Attribute of a function that is always inlined, and so compiled for its caller's instruction set.
 #define PICTURA_INLINE [[gnu::always_inline]] inline
 
 namespace pictura::host {

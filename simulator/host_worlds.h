@@ -12,8 +12,8 @@ struct HostWorlds {
   explicit HostWorlds(SimulatorSetup its_setup);
   HostWorlds(const HostWorlds&) = delete;
   HostWorlds& operator=(const HostWorlds&) = delete;
-  /// Replaces the worlds by those of another setup, in their initial state. Moves only arrays with too small a
-  /// capacity.
+  /// Replaces the worlds by those of another setup, in their initial state. The state's arrays are reallocated only if
+  /// their capacity is too small.
   void assign(const SimulatorSetup& other);
   void reserve(const SimulatorCapacity& capacity);
 

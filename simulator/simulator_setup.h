@@ -27,7 +27,7 @@ struct SimulatorSetup : SimulatorParts {
   size_t num_lights() const { return static_cast<size_t>(light_begin.back()); }
   SlotTable slot_table() const { return {world_of_slot, agent_of_slot, slot_begin, global_world}; }
   const CompiledMap& map_of(int world) const { return *maps[worlds[world].map]; }
-  /// Whether agents have lives, because a map is open.
+  /// Whether agents have lives: true if a map is open.
   bool has_lives() const;
   bool has_replayed_tracks() const;
   SimulatorCapacity needs() const { return capacity_of(maps, worlds); }

@@ -48,7 +48,7 @@ class ChunkRunner {
   void set_targets(const Targets& targets);
   /// Adds the loss gradient of this rank's part of a minibatch to the parameters' gradients, which must be defined.
   /// Computes chunks of at most forward_chunk rows. Returns the part's statistics, f64 [kNumLossStats], valid until the
-  /// next call, with a gradient norm of 0. Counts as Phase::learn and Phase::backward.
+  /// next call; their grad_norm is 0. Counts as Phase::learn and Phase::backward.
   at::Tensor add_gradients(const Minibatch& minibatch, int64_t forward_chunk, const LossFunction& loss);
   /// Returns one chunk's losses with gradients. Uses no CUDA graphs. Counts as Phase::diagnose.
   Losses losses(const Minibatch& chunk, const LossFunction& loss);

@@ -17,7 +17,7 @@ constexpr int64_t num_kept_images(int64_t num_steps, int decision_steps) { retur
 /// Estimated bytes of simulator, rollout and update for all agents.
 double estimated_bytes(const Config& config, bool keeps_images);
 
-/// Size of a configuration's network without a backbone program (policy.backbone).
+/// Size of a configuration's network; does not count a backbone program (policy.backbone).
 struct NetworkSize {
   double parameters = 0;
   /// Bytes of parameter, gradient and moments.

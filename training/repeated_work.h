@@ -11,7 +11,7 @@
 namespace pictura {
 
 /// Memory of tensors that are created during capture. All graphs share it, because they run one after the other. Keep
-/// the tensor of each result that is used after another graph's launch, or that graph may reuse its memory.
+/// each result's tensor if it is used after another graph's launch; otherwise the other graph may reuse its memory.
 class GraphMemory {
  public:
   explicit GraphMemory(Device device) : device_(device) {}

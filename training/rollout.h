@@ -75,7 +75,7 @@ struct Rollout {
   at::Tensor rows_of(int64_t step, const at::Tensor& slots) const { return slots + step * num_slots(); }
   /// Memory for the actions of one step, [num_slots].
   Span<int32_t> actions_at(int64_t step);
-  /// Records a result in the memory of `device`.
+  /// Records a result that is in the memory of `device`.
   void set_result(int64_t step, const StepResult& result, Device device);
   void compute_advantages(double gamma, double gae_lambda, LearnerExecutor* executor);
 };

@@ -15,9 +15,9 @@
 namespace pictura {
 
 /// Compiles a scene for worlds of num_agents agents with the configuration `config`. Roles, starts and goals are those
-/// of evaluations (evaluation/scene_plan.h). Other road users replay their records: at most config.parked_cars, those
-/// nearest to driven road users. Returns null if the protocol permits no driven road user. Throws Error for scenes that
-/// cannot be read or simulated.
+/// of evaluations (evaluation/scene_plan.h). Of the other road users, at most config.parked_cars replay their records:
+/// those nearest to driven road users. Returns null if the protocol permits no driven road user. Throws Error for
+/// scenes that cannot be read or simulated.
 std::shared_ptr<const CompiledMap> compile_training_scene(const SceneRef& scene, const SceneProtocol& protocol,
                                                           SimulatorConfig config, int num_agents);
 

@@ -15,8 +15,8 @@ class WeightAverage {
   /// Restarts at the current parameters, with no update averaged.
   void restart();
   /// Adds the parameters after update n: average += w (parameters - average), w = max(1 / n, 1 - 2^(-1 /
-  /// half_life_updates)). This is first the mean over all updates, later exponential, without the initial weights. Does
-  /// not wait for the device.
+  /// half_life_updates)). The average does not include the initial weights; it is first the mean over all updates,
+  /// later an exponential average. Does not wait for the device.
   void update();
 
   std::vector<NamedTensor> values;  // f32, in the order of parameters

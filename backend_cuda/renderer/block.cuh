@@ -173,7 +173,7 @@ __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& 
   }
 }
 
-// Returns the number of passes over a list, of all warps together. In each pass, a lane takes entry lane * passes +
+// Returns the number of all warps' passes over a list. In each pass, a lane takes entry lane * passes +
 // pass: neighbouring entries, which tend to be equally expensive, are in different passes.
 template <int kThreads>
 __device__ inline int passes_of(int count) {

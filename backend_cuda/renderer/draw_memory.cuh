@@ -15,7 +15,7 @@ constexpr int kDeferredBlocksPerProcessor = 2;
 // Blocks of the overflow launch and of the visibility launch.
 constexpr int kLargeThreads = 128, kLargePixels = kTileWidth_px * 512, kLargeFragments = 1 << 16;
 
-// Bits of a 32-bit pixel word that hold a face, and the number of such faces.
+// Bits of a 32-bit pixel word that hold a face, and the number of faces that they can distinguish.
 constexpr int kMarkedFaceBits = 11, kMaxMarkedFaces = (1 << kMarkedFaceBits) - 1;
 
 /// Arrays for drawing. Index: type of an index of a face, pixel or fragment. Word: type of a pair of indices.

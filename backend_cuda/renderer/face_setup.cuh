@@ -331,7 +331,7 @@ class BestOccluders {
     ScreenQuad on_screen;
     bool is_clockwise = false;
   };
-  // Whether the lane's added face and its held face are among the best.
+  // Whether the lane's offered face and its held face are among the best.
   struct Chosen {
     bool own = false, kept = false;
   };
@@ -357,7 +357,7 @@ class BestOccluders {
     return chosen;
   }
 
-  // Puts the chosen added faces into slots of held faces that were not chosen. Returns the lane's slot.
+  // Puts the chosen offered faces into slots of held faces that were not chosen. Returns the lane's slot.
   __device__ int insert(const Offered& own, Chosen chosen) {
     unsigned slots = ~__ballot_sync(kAllLanes, chosen.kept) & ((1u << Occluders::kMaxCount) - 1);
     int slot = 0;

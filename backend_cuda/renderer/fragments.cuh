@@ -256,7 +256,7 @@ __device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wan
 }
 
 // Makes all effective_samples() of each fragment visible. If a fragment covers its pixel fully, the pixel's full face
-// becomes a fragment too, because both may intersect. Lists the pixels whose fragments are not alone. Sets
+// becomes a fragment too, because the two may intersect. Lists the pixels whose fragments are not alone. Sets
 // state->divides if several fragments cover a pixel fully, and another covers it partly and is no sliver.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
@@ -283,8 +283,8 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     auto is_full = [](const PixelCoverage& coverage) { return coverage.is_full(); };
     auto hides = [](const PixelCoverage& coverage) { return !coverage.is_full() && coverage.samples != 0; };
     const Word first_of_list = first_of_word<Memory>(before);
-    // The first of several full fragments finds the others. If the list's first fragment is one that another thread
-    // adds here, that thread sets `divides`, because the list may not be linked yet.
+    // The first of several full fragments finds the others. If another thread has just added the list's first fragment,
+    // the list may not be linked yet; then only that thread decides about `divides`.
     if ((full != Memory::kNone || any_fragment(memory, Word{memory.next[i]}, is_full)) &&
         first_of_list < static_cast<Word>(count) && any_fragment(memory, first_of_list, hides)) {
       atomicOr(&memory.state->divides, 1);

@@ -1,5 +1,5 @@
-// The simulator's device memory. Arrays have the length of the simulator's capacity, so that set_worlds() within it
-// needs no allocation. Copies are asynchronous on a stream.
+// The simulator's device memory. Arrays have the length of the simulator's capacity, so that set_worlds() allocates
+// nothing within this capacity. Copies are asynchronous on a stream.
 #pragma once
 
 #include <algorithm>
@@ -242,7 +242,7 @@ struct DeviceScratch {
   DeviceBuffer<RuleOptions> options;
   DeviceBuffer<WorldView> worlds, next_worlds;
   DeviceBuffer<cuda::WorldScratch> of_worlds;
-  DeviceBuffer<int32_t> cell_begin, cell_items;  // one cell per world: {0, boxes}, and items 0, 1, 2, ...
+  DeviceBuffer<int32_t> cell_begin, cell_items;  // one cell per world, of all boxes
   DeviceBuffer<Vec2> cell_centers;
   DeviceBuffer<AgentBox> try_boxes;
   DeviceBuffer<uint32_t> free_tries;

@@ -175,7 +175,7 @@ struct FinishStep {
   }
 };
 
-/// Makes waiting agents enter on roads that end, after a step that did not end the episode.
+/// On roads that end, lets waiting agents enter after a step that did not end the episode.
 struct EnterWaiting {
   PhaseArrays arrays;
   template <typename ThreadGroup>

@@ -24,7 +24,7 @@ Snapshot make_synthetic_town(uint64_t seed, int num_agents);
 Snapshot make_crowd();
 
 /// Four worlds: the second town, the first town without agents (one view), the first town, and the second town without
-/// lights. The other worlds have three views each, which hide different thirds of the vehicles.
+/// lights. All worlds but the one without agents have three views each, which hide different thirds of the vehicles.
 struct SyntheticWorlds {
   std::vector<StaticGeometry> maps;
   SceneOwner scene;

@@ -1,4 +1,4 @@
-// Small random scenes in which two surfaces have nearly the same depth, or an exception of a drawing rule applies.
+// Small random scenes in which two surfaces have nearly the same depth, or an exception to a drawing rule applies.
 #pragma once
 
 #include <iterator>

@@ -9,8 +9,8 @@
 
 namespace pictura {
 
-// Two types, because programs may mix code with and without AVX2. Two types, because programs may mix code with and
-// without AVX2, and the two kinds of code pass the types differently.
+// (delete; the next sentence says all of it) Two types, because programs may mix code with and without AVX2, and the
+// two kinds of code pass the types differently.
 #if defined(__AVX2__) && !defined(__CUDACC__)
 inline namespace float8_in_a_register {
 

@@ -24,7 +24,7 @@ class PixelAccumulator {
     PICTURA_HD float of(Weight weight) const { return weight.area * of_kind[weight.kind]; }
   };
 
-  /// Weight of a fragment. `visible` are its effective_samples() that no other fragment occludes.
+  /// Weight of a fragment. `visible`: those of its effective_samples() that no other fragment occludes.
   PICTURA_HD static Weight weight_of(const PixelCoverage& coverage, uint64_t visible) {
     const uint64_t samples = effective_samples(coverage);
     const float share = static_cast<float>(popcount(visible)) / static_cast<float>(popcount(samples));
@@ -85,9 +85,9 @@ class PixelAccumulator {
   Part part_[kNumKinds];
 };
 
-/// Removes from the visible samples of full fragments those that are also visible in other fragments with samples.
-/// for_each(visit) calls visit(coverage, &visible) for each fragment. Changes nothing for fewer than two full
-/// fragments, or if no sample would remain.
+/// Removes samples that are visible in non-full fragments (slivers excepted) from the visible samples of full
+/// fragments. for_each(visit) calls visit(coverage, &visible) for each fragment. Changes nothing for fewer than two
+/// full fragments, or if no sample would remain.
 template <typename ForEach>
 PICTURA_HD inline void divide_remainder(ForEach&& for_each) {
   uint64_t hidden = 0, left = 0;

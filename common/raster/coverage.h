@@ -68,7 +68,7 @@ PICTURA_HD inline SampleRange whole_range() {
 /// (edges.h).
 constexpr float kToLowestBits = 1 << 8;  // the lowest bit is 1 / (kLines_rows * kRowUnits)
 /// For each column, an edge's height relative to the first column right of the pixel's centre, minus 2^14. narrow()
-/// adds a height in which the pixel's centre is 2^14, so sums are relative to the centre.
+/// adds the height in that column, where 2^14 is the pixel's centre, so sums are relative to the centre.
 PICTURA_HD inline Int16x8 column_heights(const PolygonEdge& edge) {
   return arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
 }
@@ -110,7 +110,8 @@ PICTURA_HD inline uint64_t samples_inside(const PolygonEdge& edge, float left_px
 /// edge, and an edge on the left subtracts it. A term that cancels over a closed polygon is omitted.
 PICTURA_HD inline float area_of(const PolygonEdge& edge, const EdgeCrossing& crossing, float y_px) {
   const float from = saturate(edge.y0 - y_px), to = saturate(edge.y1 - y_px);
-  // Between these heights, the edge is within the pixel's width. Beyond `right`, the whole width is left of the edge.
+  // Between these heights, the edge is within the pixel's width. At heights beyond `right`, the pixel's whole width is
+  // left of the edge.
   const float left = max_no_nan(min_no_nan(crossing.left, to), from);
   const float right = max_no_nan(min_no_nan(crossing.right, to), from);
   // Mean width of the area left of the edge.

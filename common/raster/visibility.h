@@ -1,6 +1,6 @@
 // Visibility within a pixel, for host and CUDA code. A fragment is the part of a pixel that one face covers. For each
-// pair of fragments, samples_in_front() and occluded_samples() decide which samples of one the other hides. The nearer
-// plane at the centroid of the shared samples is in front, so primitives need no order.
+// pair of fragments, samples_in_front() and occluded_samples() decide which samples of each are hidden by the other.
+// The nearer plane at the centroid of the shared samples is in front, so primitives need no order.
 #pragma once
 
 #include "pictura/common/portable/intrinsics.h"
@@ -9,7 +9,8 @@
 
 namespace pictura {
 
-// Object ids, unique within an image, contain from the highest bits: the kind, the rank (only strips), and the index.
+// Object ids are unique within an image. From the highest bits, they contain the kind, the rank (strips only) and the
+// index.
 constexpr int kKindShift = 30, kRankShift = 28;
 constexpr uint32_t kAgentKind = 0, kWallKind = 1, kLightKind = 2, kStripKind = 3;
 constexpr uint32_t kIndexMask = (1u << kRankShift) - 1;
@@ -67,8 +68,8 @@ PICTURA_HD inline Extent extent_of(uint32_t object_id, const StaticGeometryView&
   }
 }
 
-/// Corners on the ground plane. turn() replaces an index, which would force the corners into a CUDA thread's local
-/// memory.
+/// Corners on the ground plane. turn() is used instead of a variable index, which would force the corners into a CUDA
+/// thread's local memory.
 struct GroundQuad {
   Vec2 corner[4];
   PICTURA_HD void turn() {
@@ -100,8 +101,8 @@ PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQua
     return interval;
   };
   const Interval of_a = project(a), of_b = project(b);
-  // Displacement, times the side's length, after which the quads would only touch. Positive even if a wall's interval
-  // is a point within the other.
+  // Smallest displacement after which the quads would only touch, times the side's length. It is positive even if one
+  // interval is a point within the other, as a wall's may be.
   const float overlap = min_no_nan(of_a.high - of_b.low, of_b.high - of_a.low);
   const float length2_m2 = dot(side, side);
   return length2_m2 > 1e-12f && (overlap <= 0.0f || overlap * overlap <= kTouching_m * kTouching_m * length2_m2);
@@ -134,11 +135,11 @@ PICTURA_HD inline bool stands_on(const Extent& solid, const Extent& strip) {
   return fabsf(dot(normal, middle)) <= kStanding_m * fabsf(normal.z) && overlap_on_ground(solid, strip);
 }
 
-/// Whether a face is a strip seen from below. It is in front of all solids that stand on it, because solids extend
-/// through the strip.
+/// Whether a face is a strip seen from below. Such a strip is in front of all solids that stand on it, although they
+/// extend below it.
 PICTURA_HD inline bool is_strip_from_below(const ScreenFace& face) { return face.plane_distance_m > 0.0f; }
 
-/// Maximum of a solid's inverse depth, divided by that of the strip on which it stands, on one ray from the camera.
+/// Maximum ratio of the inverse depths of a solid and the strip on which it stands, along one ray from the camera.
 /// Solids extend up to kThroughStrip_m below the strip. The ratio is infinite for a camera within this distance below
 /// the strip, and 1 for a camera above.
 PICTURA_HD inline float nearest_standing(float plane_distance_m) {
@@ -184,7 +185,7 @@ PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec
   const bool first = are_equal_depths(inverse_depth_a, inverse_depth_b) ? a.object_id < b.object_id
                                                                         : inverse_depth_a > inverse_depth_b;
   if (strip_a == strip_b) return first;
-  // Here, the depths put the solid below the strip. A solid that stands on the strip only cuts into the road, so the
+  // Here, the depths put the solid below the strip. A solid that stands on the strip merely cuts into the road, so the
   // order is reversed.
   const bool is_strip_first = first == strip_a, is_from_below = is_strip_from_below(strip_a ? a : b);
   if (is_strip_first == is_from_below) return first;
@@ -253,8 +254,8 @@ PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
   return float_from_bits(bits_from_float(lowest * kLower) & ~((1u << (32 - kOccluderBoundBits)) - 1));
 }
 
-/// Whether any part of a face may be in front of the largest occluder bound of pixel (x, y). For a strip seen from
-/// below, this includes the solids that may stand on it. CUDA code may first test smaller bounds, in any order.
+/// Whether any part of a face may be in front of the largest occluder bound of pixel (x, y). A strip seen from below
+/// also passes if a solid that stands on it could. CUDA code may first test smaller bounds, in any order.
 PICTURA_HD inline bool passes_occluder_bound(const ScreenFace& face, float bound, int x, int y) {
   const float nearest = center_inverse_depth(face, x, y) + inverse_depth_half_range(face);
   return !(nearest * face.nearest_standing < bound);

@@ -11,7 +11,8 @@ namespace pictura {
 /// remains and records the last holder.
 class FolderLock {
  public:
-  /// Throws Error naming the folder, and the process that holds the lock, if any.
+  /// Throws Error if the lock cannot be taken. The message names the folder and, if known, the process that holds the
+  /// lock.
   explicit FolderLock(const std::string& folder);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;

@@ -72,7 +72,7 @@ std::optional<Reveal> reveal_of(const CornerResults& results, size_t pair, bool 
 /// hidden runs with walls. Returns the first pair if no pair has a reveal for every policy.
 size_t example_of(const CornerResults& results);
 
-/// Means of Reveal's values. Members have their names in files.
+/// Means of Reveal's values. Members are named as in files.
 struct CornerMeasures {
   Estimate distance_m, corner_m, speed_mps, approach_mps, deceleration_mps2;
 };

@@ -21,7 +21,8 @@ struct BlindCorner {
   std::map<int32_t, Vec3> lanes;
 };
 constexpr float kCornerLead_m = 60;
-/// Blind corners by approaching lane. All lanes up to kCornerLead_m before a junction are keys.
+/// Blind corners by approaching lane. Keys are the approach lane and the lanes that lead to it, up to kCornerLead_m
+/// before the junction.
 using BlindCorners = std::map<int32_t, BlindCorner>;
 BlindCorners find_blind_corners(const RoadMap& map, Span<const WallFace> walls);
 
@@ -54,8 +55,8 @@ struct CornerPair {
 /// Tolerances of similar states.
 constexpr float kSameDistance_m = 1, kSameSpeed_mps = 0.5f;
 /// Returns at most `count` pairs of similar states, ordered by hidden state. The two states of a pair have different
-/// egos or scenes. Takes pairs from all scenes in turn. Uses the first state of each ego with a hidden vehicle. Uses
-/// each ego's approach to an empty corner once, in the state most similar to the hidden state.
+/// egos or scenes. Takes pairs from all scenes in turn. Uses the first state of each ego and hidden vehicle. Uses each
+/// ego's approach to an empty corner in at most one pair, with its state most similar to that pair's hidden state.
 std::vector<CornerPair> match_corners(const std::vector<CornerState>& hidden, const std::vector<CornerState>& empty,
                                       int64_t count);
 

@@ -9,7 +9,7 @@
 
 namespace pictura {
 
-/// Spacing of a path's points, and its length before and after its origin just behind the vehicle.
+/// Spacing of a path's points, and the path's lengths before and after its origin, which is just behind the vehicle.
 constexpr float kPathSpacing_m = 0.5f, kPathBefore_m = 10, kPathAfter_m = 40;
 constexpr int kPathOrigin = static_cast<int>(kPathBefore_m / kPathSpacing_m);
 constexpr int kPathPoints = kPathOrigin + static_cast<int>(kPathAfter_m / kPathSpacing_m) + 1;

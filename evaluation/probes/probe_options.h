@@ -54,7 +54,8 @@ void visit_options(ProbeOptions& probe, Visitor&& v) {
 /// give bit-identical outputs.
 constexpr int probe_pass(Device device) { return device.is_host() ? 256 : 2048; }
 
-/// Returns a number of scenes that is equal for each policy and map, with at least two per map.
+/// Returns a number of scenes with which each policy drives each map equally often, and each map has at least two
+/// scenes.
 int default_probe_scenes(size_t num_policies, size_t num_maps);
 
 }  // namespace pictura

@@ -29,7 +29,7 @@ struct ProbedPolicy {
   std::string name;  // unique; from its file or run
   std::string path, hash;
   bool reads_images = false;
-  std::string untrained_hash;  // fresh weights that respond instead; else empty
+  std::string untrained_hash;  // hash of fresh weights that respond instead; empty if there are none
 
   /// Name in figures and tables.
   std::string responding_name() const { return untrained_hash.empty() ? name : "untrained " + name; }

@@ -1,5 +1,5 @@
 // Probe of counterfactual removal (paper, "Counterfactual probes reveal visual grounding"). It measures policies'
-// responses to a state with and without a road user, by the user's occlusion.
+// responses to a state with and without a road user, grouped by the user's occlusion.
 #pragma once
 
 #include <vector>

@@ -62,7 +62,7 @@ struct RemovalRow : ResponseMeans {
   double mean_occlusion = 0;  // NaN outside all frames
 };
 
-/// Returns for each policy rows of all distances, then of each distance band. Rows ascend by bin; users outside all
+/// Returns each policy's rows of all distances, then of each distance band. Rows ascend by bin; users outside all
 /// frames come last.
 std::vector<RemovalRow> summarize(const RemovalResults& results);
 

@@ -35,7 +35,7 @@ struct TakeoverStart {
 struct Takeover {
   int32_t steps = 0;     // driven steps; fewer than kTakeoverSteps after an infraction
   uint8_t ended_by = 0;  // Event bits
-  // sight_step: first step at which no wall hides the user, or the removed user's place, from the ego's front camera.
+  // sight_step: first step at which no wall hides TakeoverStart::user, even if removed, from the ego's front camera.
   // input_step: first step with the user in the policy's images or vector observation. -1: none.
   int32_t sight_step = -1, input_step = -1;
   float sight_distance_m = std::numeric_limits<float>::quiet_NaN();  // at sight_step, between box centres
@@ -54,9 +54,9 @@ class TakeoverWorlds {
   ~TakeoverWorlds();
 
   /// takeovers_out: [starts, policies]. Each start has its own world without the removed agent. The policy drives the
-  /// ego, with options.worlds.argmax. All other agents repeat the scene. Sight considers the maps' walls even in worlds
-  /// without walls. on_progress receives the completed fraction. Returns false after an interrupt; takeovers_out is
-  /// then invalid.
+  /// ego, with options.worlds.argmax. All other agents repeat the scene. sight_step considers the maps' walls even in
+  /// worlds without walls. on_progress receives the completed fraction. Returns false after an interrupt; takeovers_out
+  /// is then invalid.
   bool run(const std::vector<TakeoverStart>& starts, bool walls, const std::function<void(double)>& on_progress,
            std::vector<Takeover>* takeovers_out);
 
@@ -73,7 +73,7 @@ class TakeoverWorlds {
   const ProbeOptions& options_;
   const std::vector<LineOfSight>& sights_;
   CompiledMaps open_maps_;  // without walls
-  // Key: walls, and whether auxiliary slots, vectors and walls are observed.
+  // Key: whether worlds have walls, and whether the policy observes auxiliary slots, vectors and walls.
   std::map<std::array<bool, 4>, std::unique_ptr<Worlds>> worlds_;
 };
 

@@ -84,7 +84,7 @@ class Element {
   const std::string* owner_;
 };
 
-// Stations that differ by at most this count as equal.
+// Maximum difference of stations that count as equal.
 inline constexpr double kStationTolerance_m = 1e-3;
 
 /// Reads the station from which a record applies, which should be in [0, length]. Repairs: a record before the start

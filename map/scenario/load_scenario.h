@@ -21,7 +21,7 @@ struct SceneRef {
 
 struct SceneIndex {
   std::vector<SceneRef> scenes;     // sorted by file, then by record
-  std::vector<std::string> faults;  // why files or ends of files are omitted
+  std::vector<std::string> faults;  // why a file, or the rest of a file, is omitted
 };
 
 struct SceneReport {

@@ -1,4 +1,5 @@
-// Side of the road edges on which a position is, for maps without road surface. Shared by CPU and GPU code.
+// Whether a position is on the road's side of the road edges, for maps without road surface. Shared by CPU and GPU
+// code.
 #pragma once
 
 #include "pictura/common/cells_around.h"

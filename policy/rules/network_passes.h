@@ -116,7 +116,7 @@ class NetworkPasses {
   NetworkPasses(const NetworkPasses&) = delete;
   NetworkPasses& operator=(const NetworkPasses&) = delete;
 
-  /// Channels for bias_gelu(), and for norm() and bias_norm_gelu().
+  /// Whether bias_gelu(), or norm() and bias_norm_gelu(), support this number of channels.
   static constexpr bool supports_gelu(int64_t channels) { return channels % 8 == 0 && channels <= 1024; }
   static constexpr bool supports_norm(int64_t channels) {
     return channels % 64 == 0 && channels <= 512 && channels != 320 && channels != 448;

@@ -23,7 +23,7 @@ struct IdmParameters {
   float look_ahead_m = 10;
 };
 
-/// Acceleration behind a road user gap_m ahead that drives at front_mps. An infinite gap means a free road.
+/// Acceleration behind a road user that is gap_m ahead and drives at front_mps. An infinite gap means a free road.
 float idm_acceleration(const IdmParameters& parameters, float speed_mps, float gap_m, float front_mps);
 
 /// Path of an agent's reference point.

@@ -21,8 +21,8 @@ PICTURA_HD inline void clear_result(const StepArrays& results, int slot) {
   results.sums[slot] = {};
 }
 
-/// An agent that takes no actions accepts every command, because it ignores it. A command to follow a record needs a
-/// map with a record.
+/// An agent that takes no actions accepts every command, because it ignores invalid commands. A command to follow a
+/// record needs a map with a record.
 template <typename CommandType>
 PICTURA_HD bool accepts(const WorldView& world, int agent, const CommandType& command) {
   if (!takes_actions(world, agent)) return true;

@@ -156,7 +156,7 @@ struct MapView {
   int32_t recorded_steps = 0;              // from the start of episodes
   // If above 0: recorded_agents from this index on are replayed tracks, whose boxes take the places of parked cars.
   int32_t first_replayed = 0;
-  float max_box_radius_m = 0, max_speed_mps = 0;  // half-diagonal of boxes
+  float max_box_radius_m = 0, max_speed_mps = 0;  // the radius is half the diagonal of a box
   uint8_t is_open = 0;                            // 1: an open map, whose roads end
 };
 

@@ -29,8 +29,8 @@ PICTURA_HD inline void observe_ego(const WorldView& world, int slot, float* out)
 }
 
 /// Scales conditioning by the paper's training ranges, so that all runs observe equal coefficients equally.
-/// Coefficients that the paper does not vary are observed as 0. Pedestrians' coefficients below the range are observed
-/// as at least -2.
+/// Coefficients that the paper does not vary are observed as 0. Coefficients below the range, such as those of
+/// pedestrians, are observed as -2 or more.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD void observe_conditioning(const WorldView& world, int slot, float* out, const ThreadGroup& group = {}) {
   for (int i = group.rank(); i < kNumConditioning; i += group.size()) {
@@ -286,7 +286,7 @@ PICTURA_HD inline void prefetch_list_near(const MapView& map, const NearPlace& p
   for (int line = 0; line < kLines; ++line) prefetch(items, line * kLineBytes);
 }
 
-/// Argument of observe_set() for a step, which overwrites the previous step's rows.
+/// Argument of observe_set() for a step. The destination contains the previous step's rows.
 struct StepObservation {
   /// Number of rows that may be nonzero; clamped, because callers may have changed the count.
   PICTURA_HD static int num_filled(const SetRows& set) { return min_of(max_of(*set.count, 0), set.capacity); }

@@ -247,7 +247,8 @@ PICTURA_HD inline void put_parked_car(const WorldView& world, int car, int i) {
   world.boxes[world.num_agents + car] = world.boxes_before[world.num_agents + car] = box;
 }
 
-/// Draws a point uniformly on lanes with running lengths end_m. `lane` of the result is an index into end_m.
+/// Draws a point uniformly on lanes or walkways. `end_m` is the running sum of their lengths. `lane` of the result is
+/// an index into end_m.
 PICTURA_HD inline RoutePoint draw_place(Span<const float> end_m, RandomStream* random_inout) {
   const float at_m = random_inout->uniform(0.0f, end_m[end_m.size() - 1]);
   size_t low = 0, high = end_m.size() - 1;

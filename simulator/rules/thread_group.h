@@ -1,6 +1,7 @@
 // Cooperation of several threads in the loops of a rule. The threads of a group run in lockstep and call the rule with
 // the same arguments. Each thread processes every size()-th item. All threads return the same result. It must not
-// depend on the order of items, so threads combine only any(), sums of integers, and the smallest item.
+// depend on the order of items, so threads combine their results only by any(), sums of integers, and choice of the
+// smallest item.
 #pragma once
 
 #include "pictura/simulator/rules/fast/nearest.h"

@@ -47,7 +47,7 @@ struct WorldView {
   GridView box_cells;                // visible boxes by the cell of their centres
   Vec2* cell_centers = nullptr;      // [num_boxes] in the order of box_cells.items
   LightPlan* light_plans = nullptr;  // [stop lines]
-  LightState* lights = nullptr;      // [stop lines] during the step; observed before it
+  LightState* lights = nullptr;      // [stop lines] state during the step, which agents observed before it
 };
 
 PICTURA_HD inline Motion motion_of(const AgentStateView& agents, int slot) {

@@ -50,8 +50,8 @@ SimulatorTotals totals_of_all(SimulatorTotals own, Communicator* communicator);
 /// Communicator of a single process.
 Communicator* single_communicator();
 
-/// Creates the communicator of these ranks, which must outlive it: Gloo on hosts, NCCL on CUDA devices, one device per
-/// rank. Throws Error if this build or machine lacks the library.
+/// Creates a communicator (Gloo on hosts, NCCL on CUDA devices, one device per rank) of these ranks, which must outlive
+/// it. Throws Error if this build or machine lacks the library.
 std::unique_ptr<Communicator> make_communicator(Ranks* ranks, Device device);
 
 /// Variants for any number of ranks.

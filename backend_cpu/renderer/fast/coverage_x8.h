@@ -83,7 +83,7 @@ inline void coverage_x8(const PolygonEdge* edges, int count, float min_area, con
     const Float8 width = saturate(((left + right) - crossings) * edge.half_dx_dy + 0.5f);
     const Float8 part = (right - left) * width + ((edge.dy_dx > 0.0f ? to : from) - right);
     area = is_below ? area + part : area - part;
-    // narrow(): an edge bounds the heights on one side.
+    // narrow(): each edge is a lower or an upper bound of the heights.
     const Float8 at = saturate(crossings * fabsf(edge.rows_scale) + edge.rows_offset);
     const __m256i heights = _mm256_castps_si256((at + kToLowestBits).value);
     const __m256i columns = _mm256_broadcastsi128_si256(std::bit_cast<__m128i>(column_heights(edge).value));

@@ -1,5 +1,5 @@
-// Set-up of eight strips in parallel (SIMD), by the rules of common/raster from strip_quad() to is_quad_visible(),
-// without edges.
+// Set-up of eight strips in parallel (SIMD), like the functions of common/raster from strip_quad() to
+// is_quad_visible(); it makes no edges.
 #pragma once
 
 #include <cstddef>

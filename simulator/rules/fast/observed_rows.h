@@ -38,7 +38,7 @@ static_assert(offsetof(StopLine, right_m) == 3 * sizeof(float) && sizeof(StopLin
 #endif
 
 // Functions without a Float8 parameter do not return a Float8. Mangled names contain no return types, and a program may
-// contain two types Float8.
+// contain two types named Float8.
 
 /// Writes the row of one of the nearest boxes.
 PICTURA_HD inline void write_partner(const AgentBox& box, float speed_mps, const RowFrame& frame, float* row_out) {
