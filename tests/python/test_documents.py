@@ -150,6 +150,11 @@ def test_the_card_is_what_the_lists_say():
     assert (out.returncode, out.stdout, out.stderr) == (0, "", ""), "run scripts/environment_card"
 
 
+def test_model_cards_are_up_to_date():
+    out = subprocess.run([sys.executable, ROOT / "scripts/model_cards", "--check"], capture_output=True, text=True, timeout=120)
+    assert (out.returncode, out.stdout, out.stderr) == (0, "", ""), "run scripts/model_cards"
+
+
 def test_the_card_has_every_number_of_actions_and_arguments():
     text = (DOCS / "reference/environment.md").read_text()
     signature = pictura.Simulator.__init__.__doc__.split("->")[0]
