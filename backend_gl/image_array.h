@@ -35,8 +35,8 @@ class ImageArray {
   void begin();
   /// Averages the first `images` layers into the buffer.
   void resolve(int images);
-  /// Appends to *copies_out the copies of images [first, first + images) to `out`. stride: values from one image to the
-  /// next.
+  /// Appends to *copies_out the copies that write images [first, first + images) into `out`. stride: values from one
+  /// image to the next.
   void plan_copy(int first, int images, void* out, int64_t stride, std::vector<RowCopy>* copies_out) const;
   /// Copies to the host are finished when the call returns; copies to a device are enqueued.
   void copy(Span<const RowCopy> copies, Stream stream);

@@ -88,8 +88,8 @@ struct ControllerInside {
   std::shared_ptr<Controller> controller;
 };
 
-/// Returns the contents of a Python object. Throws UsageError, beginning with `what`, unless it is a pictura.Simulator
-/// (if `expected` is "Simulator").
+/// Returns the contents of a Python object. Throws UsageError, beginning with `what`, unless the object's contents are
+/// Inside; `expected` names the class in the message, such as "Simulator".
 template <typename Inside>
 Inside inside_of(const py::handle& object, std::string_view what, std::string_view expected) {
   const py::object inside = py::hasattr(object, "_inside") ? py::object(object.attr("_inside")()) : py::none();

@@ -43,7 +43,7 @@ class ParameterVisitor {
   /// function: name in messages.
   explicit ParameterVisitor(std::string function) : function_(std::move(function)) {}
 
-  /// The code that uses the number checks its range.
+  /// The range is checked where the number is used.
   template <typename T, typename... Range>
   void value(const NamedOption& option, T& value, Range...) {
     add<T>(option, value, [&value](const T& given) { value = given; });
@@ -73,7 +73,7 @@ class ParameterVisitor {
   void device(const NamedOption& option, Device& value);
   /// Adds map names, with ranges of seeds expanded.
   void maps(const NamedOption& option, std::vector<std::string>& names);
-  /// Adds a dict from coefficients to numbers or (low, high), which replace their ranges.
+  /// Adds a dict from coefficients to their ranges: a number or (low, high).
   void conditioning(const NamedOption& option, ConditioningRanges& ranges);
   /// Adds a dict, stored as texts "name=value".
   void numbers_by_name(const NamedOption& option, std::vector<std::string>& texts);

@@ -6,8 +6,8 @@
 namespace pictura {
 
 constexpr int kDefaultPatch_px = 4;
-/// Whether renderers can write patches with sides of patch_px. A kernel's thread writes four neighbouring pixels of one
-/// patch.
+/// Whether renderers can write patches with sides of patch_px. The side must be a multiple of 4, because a kernel's
+/// thread writes four neighbouring pixels of one patch.
 PICTURA_HD constexpr bool is_drawn_patch(int patch_px) { return patch_px > 0 && patch_px <= 16 && patch_px % 4 == 0; }
 
 PICTURA_HD constexpr int patch_values(int patch_px) { return 3 * patch_px * patch_px; }

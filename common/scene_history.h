@@ -43,7 +43,7 @@ class SceneHistory {
 
  protected:
   int num_steps() const { return num_steps_; }
-  /// Returns gather()'s mapping. `views`: [steps, views per step].
+  /// Returns the stored views, for gather(). `views`: [steps, views per step].
   HistoryViews history_views(const View* views) const {
     return {views, static_cast<int64_t>(size_.views), num_steps_, static_cast<int32_t>(size_.worlds),
             static_cast<int32_t>(size_.agents)};

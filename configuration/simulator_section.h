@@ -15,7 +15,7 @@ struct NamedShare {
   std::string name;
   double share = 0;
 };
-/// Parses "NAME=SHARE"; NAME may contain "=". Returns nullopt without a name or a share above 0.
+/// Parses "NAME=SHARE"; NAME may contain "=". Returns nullopt if the name is missing or the share is not above 0.
 std::optional<NamedShare> parse_share(const std::string& text);
 
 /// [simulator.scenes]: training worlds of recorded scenes.

@@ -62,7 +62,8 @@ class Canvas {
     void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
   };
   Canvas(std::unique_ptr<std::string> svg, const std::string& name, int width_px, int height_px, Rgb background);
-  // A reference, because the caller computes `surface` from the same pointer, and evaluation order is unspecified.
+  // `svg` is a reference, because the caller computes `surface` from the same pointer, and evaluation order is
+  // unspecified.
   Canvas(cairo_surface_t* surface, std::unique_ptr<std::string>&& svg, const std::string& name, int width_px,
          int height_px, Rgb background);
   void check(cairo_status_t status) const;

@@ -44,7 +44,7 @@ class PolicySession;
 
 struct DrivenWorld {
   std::unique_ptr<Simulator> simulator;
-  // For a policy: its session. For images: their renderer and its configuration.
+  // For a policy: its session. `renderer` and `trained_view` are set only if the policy reads images.
   std::shared_ptr<PolicySession> session;
   std::unique_ptr<Renderer> renderer;
   std::optional<RendererConfig> trained_view;
@@ -62,10 +62,10 @@ struct DrivenWorld {
 };
 
 /// Creates a world at the start of its first episode, with the light timing of evaluations. `policy`: a controller of
-/// host_controller_names(), or the path of a checkpoint, whose policy takes its most likely actions. With a checkpoint,
-/// walls, population, observations and images are those of its training unless the options override them; the
-/// conditioning is that of evaluations. In a recorded scene, the driver drives the controlled tracks; with the
-/// controller "log", all tracks follow the recording. Throws UsageError for a simulator without host memory.
+/// host_controller_names(), or the path of a checkpoint, whose policy takes its most likely actions. A checkpoint's
+/// training determines walls, population, observations and images, unless the options override them; the conditioning
+/// is that of evaluations. In a recorded scene, the driver drives the controlled tracks; with the controller "log", all
+/// tracks follow the recording. Throws UsageError for a simulator without host memory.
 DrivenWorld make_world(const WorldOptions& options, const std::string& policy);
 
 }  // namespace pictura

@@ -44,11 +44,11 @@ struct SceneCounts {
 struct SceneResults {
   EvaluationSetting setting;  // `maps` holds SceneEvaluateOptions::scenes
   SceneProtocol protocol;
-  // Files that cannot be read wholly or in part, with reasons, even if they are outside the range of scenes.
+  // Why files, or the rest of a file, cannot be read; includes files outside the range of scenes.
   std::vector<std::string> unread;
   int first_scene = 0, num_scenes = 0;
   int without_drivers = 0;                       // excluded: all road users are parked or absent
-  int repaired_headings = 0;                     // in scored scenes; SceneProtocol::max_first_turn_deg
+  int repaired_headings = 0;                     // in scored scenes; see SceneProtocol::max_first_turn_deg
   std::vector<std::string> faults;               // excluded scenes that cannot be read or simulated
   std::vector<std::vector<SceneCounts>> counts;  // [densities][scored scenes]
 

@@ -53,7 +53,7 @@ class RolloutsFile {
   size_t size_ = 0;
 };
 
-/// Reads one or several concatenated messages SimAgentsChallengeSubmission, also of other programs.
+/// Reads one or several concatenated messages SimAgentsChallengeSubmission, also from other programs.
 class RolloutsReader {
  public:
   /// Throws Error naming file and field for invalid bytes, another submission type, or a repeated scenario.

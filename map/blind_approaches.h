@@ -11,7 +11,7 @@ namespace pictura {
 /// Counts of blind approaches. A driver and a vehicle approach a junction on different roads, at equal distance. Their
 /// paths cross in the junction. The vehicle is hidden if walls block every tested line of sight to its box.
 struct BlindApproaches {
-  int32_t approaches = 0;  // lanes that lead to a crossed path through a junction
+  int32_t approaches = 0;  // lanes that lead to a path that crosses another path in a junction
   int32_t blind = 0;       // approaches with at least one hidden vehicle
   int32_t crossings = 0;   // ordered pairs of crossing paths
   int32_t hidden = 0;      // crossings with a hidden vehicle

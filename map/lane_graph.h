@@ -58,8 +58,8 @@ class LaneGraph {
     int32_t lane = 0;
     bool is_change = false;
   };
-  /// Search over nodes. Node n < num_lanes() is the start of lane n. Node num_lanes() + n is the position on lane n at
-  /// the start position's fraction of the length.
+  /// Search over nodes. Node n < num_lanes() is the start of lane n. Node num_lanes() + n is the point of lane n at
+  /// begin_fraction of the lane's length.
   struct Search {
     double begin_fraction = 0;            // start position relative to its lane's length
     std::vector<double> cost_m;           // [nodes]

@@ -24,8 +24,8 @@ struct MapCopy {
   int copy = 0;
 };
 
-/// Splits a name at its last #. Without a number after it, the name has no copy. Throws UsageError, which names the
-/// map, if the number is not in [1, kMaxMapCopies].
+/// Splits a name at its last #. If no number follows, returns the whole name and copy 0. Throws UsageError, which names
+/// the map, if the number is not in [1, kMaxMapCopies].
 MapCopy parse_map_copy(std::string_view name);
 
 std::string map_copy_name(std::string_view map, int copy);

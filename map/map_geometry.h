@@ -11,8 +11,8 @@
 namespace pictura {
 
 /// Placement of light heads. `visible` moves heads that are less than kVisibleHeadAhead_m beyond the middle of their
-/// stop line. They move ahead to this distance, kVisibleHeadHeight_m above the road. So a vehicle that waits at the
-/// line sees the head.
+/// stop line. They move ahead to this distance, and to a height of kVisibleHeadHeight_m above the road. So a vehicle
+/// that waits at the line sees the head.
 enum class LightHeads : uint8_t { as_mapped, visible };
 constexpr std::array<const char*, 2> kLightHeadsNames{"as_mapped", "visible"};
 constexpr float kVisibleHeadAhead_m = 10.0f, kVisibleHeadHeight_m = 3.5f;

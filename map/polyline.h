@@ -82,7 +82,7 @@ class SampleBudget {
   InterruptibleWork work_;
 };
 
-/// Parameters between which a curve is smooth. At a break, either adjacent formula may determine its value.
+/// Parameters between which a curve is smooth. At a break, the curve's value may come from either adjacent formula.
 struct CurveBreaks {
   std::vector<double> s;
   // [intervals] Upper bounds of the second derivatives of position and of half the width, with respect to s. Infinite
@@ -98,7 +98,7 @@ std::vector<CurvePoint> sample_curve(const CurveBreaks& curve, double tolerance_
   constexpr double kMinStep = 0.01;
   constexpr double kStepsPerPiece = 4;
   constexpr double kDenseShare = 0.1;  // share of the tolerance for sampling; the rest is for thinning
-  constexpr double kSafety = 0.9;      // far above rounding errors
+  constexpr double kSafety = 0.9;      // the margin of 0.1 is far above rounding errors
   const std::vector<double>& breaks = curve.s;
   std::vector<CurvePoint> dense{eval(breaks.front())};
   double low = 0, high = 0, bend = 0;
@@ -129,7 +129,7 @@ std::vector<CurvePoint> sample_curve(const CurveBreaks& curve, double tolerance_
   for (std::size_t i = 1; i < breaks.size(); ++i) {
     const double begin = dense.back().s, span = breaks[i] - begin;
     if (span <= 0) continue;
-    // With several equal steps per maximum length, thinned pieces can be nearly as long as the maximum.
+    // Steps are at most a quarter of the maximum length, so that thinned pieces can be nearly as long as the maximum.
     const int steps = static_cast<int>(std::ceil(kStepsPerPiece * span / max_piece_m - kPieceRounding));
     low = begin;
     high = breaks[i];

@@ -46,11 +46,12 @@ LanePieces segments_of(const RoadMap& map, LanePredicate is_wanted);
 /// if their heights there differ by kSameRoadLevel_m or more.
 std::optional<Vec2> crossing(Vec3 a, Vec3 b, Vec3 c, Vec3 d);
 
-/// Finds junctions. Wanted lanes of different roads become junction lanes if they cross away from their ends. All
-/// junction lanes, including those marked before, get new junctions. Lanes that cross, fork or merge share a junction,
-/// named after the first lane's road. A positive bridged_m is for roads that are cut into many lanes. Successive
-/// junction lanes then share a junction. A wanted lane between junction lanes then joins their junction if it is at
-/// most bridged_m long. Calls count_work(steps), so that the caller can limit the work.
+/// Finds junctions. Lanes of different roads for which is_wanted() is true become junction lanes if they cross at a
+/// point that is an end of neither. All junction lanes, including those marked before, get new junctions. Lanes that
+/// cross, fork or merge share a junction, named after the first lane's road. A positive bridged_m is for roads that are
+/// cut into many lanes. Successive junction lanes then share a junction. A wanted lane between junction lanes then
+/// joins their junction if it is at most bridged_m long. Calls count_work(steps), so that the caller can limit the
+/// work.
 void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
                              const std::function<void(std::size_t)>& count_work, RoadMap* map);
 

@@ -61,8 +61,8 @@ struct Lane {
   int32_t left_neighbor = -1, right_neighbor = -1;  // driving or ramp, same direction; marks are ignored
   float length_m = 0;
   float speed_limit_mps = 0;
-  // Indices of the road and the section in the file. The lane is OpenDRIVE's lane id; in Lanelet2 it is 1, or -1
-  // against the lanelet.
+  // Indices of the road and the section in the file. source_lane is OpenDRIVE's lane id; in Lanelet2, it is 1, or -1
+  // for the opposite lane of a two-way lanelet.
   int32_t source_road = 0, source_section = 0, source_lane = 0;
 };
 

@@ -27,7 +27,7 @@ struct CheckpointFile {
   std::vector<StoredTensor> tensors(const char* list) const;
   /// Returns the bytes of a header entry. Throws as tensors() does.
   std::string_view bytes(const char* entry) const;
-  /// Throws Error naming the first entry in which the observation schema is not the current one.
+  /// Throws Error naming the first different entry if the saved observation schema is not the current one.
   StoredPolicy policy() const;
 
   std::string path;

@@ -28,7 +28,7 @@ struct HostObservation {
 class HostNetwork {
  public:
   /// Throws Error naming file and parameter if a parameter is missing, not finite, or of another shape. Throws Error
-  /// naming the program if policy.backbone is a program.
+  /// naming the file of policy.backbone if that is a TorchScript program.
   HostNetwork(const StoredPolicy& saved, int num_cameras);
   ~HostNetwork();
   HostNetwork(const HostNetwork&) = delete;

@@ -37,8 +37,8 @@ void unfold(const ConvolutionSize& size, const float* images, int64_t n, float* 
 /// Backward pass of unfold().
 void fold(const ConvolutionSize& size, const float* taps_grad, int64_t n, float* images_grad_out);
 
-/// Splits one camera's images into patches with the channels of PatchSize, without padding channels. images: u8 [views,
-/// cameras, 3, height, width]; out: [views, rows, columns, 3 patch_px^2].
+/// Splits one camera's images into patches. Channels are ordered as in PatchSize, but end after 3 patch_px^2. images:
+/// u8 [views, cameras, 3, height, width]; out: [views, rows, columns, 3 patch_px^2].
 void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t camera, int64_t height, int64_t width,
              int64_t patch_px, float* out);
 

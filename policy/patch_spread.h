@@ -18,9 +18,9 @@ int patch_side_px(int64_t channels);
 /// blocks of k x k px keep their features.
 StoredTensor spread_over_patches(const StoredTensor& weight, int factor);
 
-/// Variant without the division by k^2, for Adam's moments. In images that are constant in blocks, all k^2 weights have
-/// the source weight's gradient, and so its step. Together they change the feature k^2 times as much, which
-/// rate_factor_of_spread() corrects.
+/// Variant without the division by k^2, for Adam's moments. In images that are constant in blocks, each of the k^2
+/// weights has the source weight's gradient, and therefore makes the same step. Together they change the feature k^2
+/// times as much, which rate_factor_of_spread() corrects.
 StoredTensor repeat_over_patches(const StoredTensor& weight, int factor);
 
 /// Learning-rate factor of spread weights, with which a step changes features as much as before. Weight decay keeps the

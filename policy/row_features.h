@@ -1,5 +1,5 @@
-// Features of observed rows that resolve positions near the agent. Networks learn slowly to use small differences, and
-// observations divide positions by 120 m.
+// Features, computed from observed rows, that distinguish close positions near the agent. Networks learn slowly to use
+// small differences, and observations divide positions by 120 m.
 #pragma once
 
 #include <ATen/ATen.h>

@@ -8,7 +8,7 @@
 
 namespace pictura {
 
-/// Returns the shapes from above in drawing order, traffic lights last in the map's order.
+/// Returns the shapes from above in drawing order; the last ones are the traffic lights, in the map's order.
 std::vector<ReplayShape> map_shapes(const CompiledMap& map);
 
 /// Returns the geometry that cameras see. A strip that continues the previous strip extends its line.

@@ -11,7 +11,8 @@ struct ObservationQuery {
   int32_t slot = 0;
   int32_t hidden_begin = 0, hidden_end = 0;      // range of ObservationQueries::hidden
   int32_t inserted_begin = 0, inserted_end = 0;  // range of ObservationQueries::inserted
-  /// 0: farther boxes take the rows of hidden boxes among the partners (observed road users). 1: these rows are zeros.
+  /// 0: farther boxes get the rows that the hidden boxes would have among the partners (observed road users). 1: these
+  /// rows are zeros.
   int32_t leaves_gaps = 0;
 };
 

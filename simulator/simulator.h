@@ -211,7 +211,7 @@ class Simulator {
   /// Advances by commands [slots]. If all are actions, the result is bit for bit that of the overload above.
   StepResult step(Span<const Command> commands, Stream stream = {});
 
-  /// Throws Error if the host already knows that a call was rejected since the last Error. Does not wait.
+  /// Throws Error if the host already knows of a rejected call; each rejection throws at most once. Does not wait.
   virtual void poll() {}
   /// Waits for the work on this stream, then calls poll().
   virtual void check(Stream /*stream*/ = {}) {}

@@ -31,7 +31,7 @@ struct SimulatorSetup : SimulatorParts {
   bool has_lives() const;
   bool has_replayed_tracks() const;
   SimulatorCapacity needs() const { return capacity_of(maps, worlds); }
-  /// Assigning another setup within the capacity then moves no array.
+  /// Reserves memory, so that assigning another setup within the capacity moves no array.
   void reserve(const SimulatorCapacity& capacity);
 
   /// Returns the view of a world, but without pointers to state.
@@ -45,7 +45,8 @@ struct SimulatorSetup : SimulatorParts {
   std::vector<GeometryHandle> geometry;                     // [worlds]
 };
 
-/// Token of a simulator's current worlds, renewed by set_worlds().
+/// Identifies a simulator's current worlds, so that restore() rejects snapshots of earlier worlds; renewed by
+/// set_worlds().
 using WorldsToken = std::shared_ptr<const char>;
 inline WorldsToken new_worlds_token() { return std::make_shared<const char>(); }
 

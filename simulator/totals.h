@@ -23,7 +23,7 @@ constexpr float kRest_mps = 0.3f;  // maximum speed at rest
 
 // COUNT is an integer, SUM a floating-point sum, TERMS such a sum for each reward term.
 #define PICTURA_TOTALS(COUNT, SUM, TERMS)                                                       \
-  COUNT(agent_steps) /* steps of single active agents */                                        \
+  COUNT(agent_steps) /* agent-steps: one per step and active agent */                           \
   COUNT(slot_steps)  /* number of slots times steps */                                          \
   COUNT(episodes)    /* number of times that a step reset a world */                            \
   PICTURA_EVENT_TOTALS(COUNT)                                                                   \

@@ -16,7 +16,7 @@ class KeptImages {
 
   /// Stores the images [n, cameras, ...] of `slots`, i64 [n]. Step 0 discards all previous images.
   void put(int64_t step, const at::Tensor& slots, const std::vector<ImageBlock>& images);
-  /// Returns the images of rows, i64 [batch] of step * num_slots + slot.
+  /// Returns the images of rows, i64 [batch]; a row is step * num_slots + slot.
   std::vector<ImageBlock> gather(const at::Tensor& rows) const;
   /// Number of times that the memory has moved.
   uint64_t generation() const { return generation_; }

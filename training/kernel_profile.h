@@ -13,8 +13,8 @@ struct KernelTime {
   double seconds = 0;
 };
 
-/// Profile of the work between begin() and end(), which becomes a few per cent slower. A process can have only one
-/// profile at a time.
+/// Profile of the work between begin() and end(). Profiling makes the work a few per cent slower. A process can have
+/// only one profile at a time.
 class KernelProfile {
  public:
   static void begin();

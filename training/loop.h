@@ -30,7 +30,7 @@ struct TrainProgress {
   double agent_steps_per_s = 0;         // since start or resumption
   double recent_agent_steps_per_s = 0;  // over the last minute
   double episode_return = 0;            // mean over agent episodes of the last updates; NaN if none ended
-  double eta_s = 0;                     // until train.updates, the schedule or `minutes` ends
+  double eta_s = 0;                     // until train.updates are done, or the schedule or `minutes` ends
   bool ends_by_minutes = false;         // `minutes` ends first; eta_s is then an upper bound
   Scalars scalars;                      // logged values, as in progress.csv
   UpdateCost cost;

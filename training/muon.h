@@ -9,8 +9,8 @@
 
 namespace pictura {
 
-/// Whether Muon updates a parameter: a weight of a hidden layer. AdamW updates biases, norms, queries, layers that read
-/// positions or pixels, and heads.
+/// Whether Muon updates a parameter: true for weights of hidden layers. AdamW updates biases, norms, queries, layers
+/// that read positions or pixels, and heads.
 bool is_stepped_by_muon(const NamedTensor& parameter);
 
 /// Root mean squares of the weights that is_stepped_by_muon() selects: over all, and the maximum over matrices. Both

@@ -15,8 +15,8 @@ namespace pictura {
 class Opponents {
  public:
   /// Reads the policies of simulator.others.policies. Throws Error naming a file that contains no policy. Throws Error
-  /// if neither a policy nor the learner reads images, and only the policy has auxiliary slots. Throws Error if a
-  /// policy's decision steps do not divide train.num_steps.
+  /// if a policy without images has auxiliary slots, but the learner has neither images nor auxiliary slots. Throws
+  /// Error if a policy's decision steps do not divide train.num_steps.
   Opponents(const Config& config, Device device, Communicator* communicator);
   ~Opponents();
   Opponents(const Opponents&) = delete;

@@ -16,8 +16,8 @@ struct AdvantageFilter {
   double average = -1;  // average over rollouts; negative: none yet
 };
 
-/// Limits of rounding differences between the rollout's and the learner's log-probabilities before the first step: for
-/// the mean absolute difference, and for the share of ratios outside the clip range. Beyond them, log-probabilities are
+/// Limits for rounding differences between the rollout's and the learner's log-probabilities in an update's first
+/// minibatch: mean absolute difference, and share of ratios outside the clip range. Beyond them, log-probabilities are
 /// recomputed.
 constexpr double kMaxAbsLogRatio = 1e-3, kMaxClipFraction = 1e-3;
 

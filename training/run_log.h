@@ -83,7 +83,7 @@ class RunLog {
   std::optional<ProgressCsv> evaluation_csv_;  // null if the run never evaluates
   double evaluation_s_ = 0;
   std::deque<RecentUpdate> recent_;
-  // Time without evaluations, and agent-steps until then.
+  // Time since the start without evaluations, and the run's agent-steps at that time.
   struct Moment {
     double s;
     int64_t agent_steps;

@@ -13,7 +13,7 @@ enum class RunWork { update, evaluation };
 
 class RunTime {
  public:
-  /// minutes: limit of wall time since `start`; 0: none. Durations are in Run::longest_update_s, also those of earlier
+  /// minutes: limit of wall time since `start`; 0: none. Run::longest_update_s holds the durations, also from earlier
   /// processes on equal devices with equally many agents. The run must outlive this object.
   RunTime(double minutes, const Stopwatch& start, Run* run);
 
@@ -21,7 +21,8 @@ class RunTime {
   /// Collective: every rank must call it.
   bool would_exceed_limit(RunWork work) const;
   void add(RunWork work, double seconds);
-  /// Multiplies expected durations by `times`. The next update's duration then replaces the scaled duration of updates.
+  /// Multiplies expected durations by `times`. The longest update's scaled duration then lasts only until the next
+  /// update.
   void scale_expected_duration(double times);
   /// Limits progress->eta_s to the remaining time.
   void limit_eta(TrainProgress* progress) const;

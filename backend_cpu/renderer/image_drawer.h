@@ -41,8 +41,8 @@ class ImageDrawer {
   void prepare(const ImageRequest& request);
   const Occluders& occluders() const { return setting_.occluders; }
   void draw(const ImageTarget& target);
-  /// Adds the agent's visible weight in the prepared image to `among_all`, and its weight without other primitives to
-  /// `alone`.
+  /// Adds the agent's visible weight in the prepared image to sum_inout->among_all, and its weight without other
+  /// primitives to sum_inout->alone.
   void accumulate_visibility(int32_t agent, VisibilitySum* sum_inout);
   /// Calls visit(y * width + x, coverage, colour) for each pixel's fragments, front to back.
   void visit_fragments(const std::function<void(int, const PixelCoverage&, Rgb)>& visit);

@@ -144,8 +144,8 @@ __device__ inline int32_t warp_allocate_one(int32_t* counter, bool wanted) {
   return __shfl_sync(kAllLanes, first, 0) + __popc(wanting & lanes_below());
 }
 
-// Returns the rank, among lanes with items, of the owner of item `first + lane_index()`. Items are numbered
-// consecutively over all lanes; the calling lane's items start at `begin`.
+// Finds the lane that owns item `first + lane_index()`, and returns its rank among the lanes with items. Items are
+// numbered consecutively over all lanes; the calling lane's items start at `begin`.
 __device__ inline int owner_rank(int first, int begin, bool has_some) {
   const bool starts_here = has_some && begin >= first && begin < first + kWarpSize;
   const unsigned starts = __reduce_or_sync(kAllLanes, starts_here ? 1u << (begin - first) : 0u);
@@ -173,7 +173,7 @@ __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& 
   }
 }
 
-// Returns the number of all warps' passes over a list. In each pass, a lane takes entry lane * passes +
+// Returns the number of passes over a list, summed over all warps. In each pass, a lane takes entry lane * passes +
 // pass: neighbouring entries, which tend to be equally expensive, are in different passes.
 template <int kThreads>
 __device__ inline int passes_of(int count) {

@@ -17,8 +17,8 @@ constexpr int kLaneCorners = 8;
 
 struct ClipShared {
   Quad quad;  // quad of one lane, read by all lanes
-  // Corners: one column per lane, or the first row for the warp. Two more rows hold corners that are written before the
-  // count is checked.
+  // Corners: a lane's face takes the lane's column; a warp's face takes the first row. Two more rows hold corners that
+  // are written before the count is checked.
   static constexpr int kRows = kLaneCorners + 2;
   float x[kRows][kWarpSize], y[kRows][kWarpSize], z[kRows][kWarpSize];
   uint16_t edges[kLaneCorners * kWarpSize];  // see LaneEdge
@@ -137,8 +137,8 @@ __device__ inline WarpFace make_light(const FaceSetupContext& context, int32_t i
           light_ref(index)};
 }
 
-// Clips a lane's face in place, with the result of clip_face. Returns the number of corners, or kTooManyCorners if they
-// do not fit or the face is not exactly convex.
+// Clips a lane's face in place; the result equals that of clip_face. Returns the number of corners, or kTooManyCorners
+// if they do not fit or the face is not exactly convex.
 constexpr int kTooManyCorners = -1;
 __device__ inline int clip(const Frustum& f, unsigned crossed, int count, LaneCorners corners) {
   if (crossed == kOutside) return 0;

@@ -283,8 +283,8 @@ __device__ void finish_fragments(const Memory& memory, int count) {
     auto is_full = [](const PixelCoverage& coverage) { return coverage.is_full(); };
     auto hides = [](const PixelCoverage& coverage) { return !coverage.is_full() && coverage.samples != 0; };
     const Word first_of_list = first_of_word<Memory>(before);
-    // The first of several full fragments finds the others. If another thread has just added the list's first fragment,
-    // the list may not be linked yet; then only that thread decides about `divides`.
+    // The first of several full fragments finds the others. If another thread has just put the full face at the front
+    // of the list, the list may not be linked yet; then only the other thread decides about `divides`.
     if ((full != Memory::kNone || any_fragment(memory, Word{memory.next[i]}, is_full)) &&
         first_of_list < static_cast<Word>(count) && any_fragment(memory, first_of_list, hides)) {
       atomicOr(&memory.state->divides, 1);

@@ -12,8 +12,8 @@ __device__ inline int32_t view_of(const DrawTask& task, int32_t image) {
 }
 __device__ inline int32_t camera_of(const DrawTask& task, int32_t image) { return image % num_cameras(task); }
 
-// Returns how many of the launch's views have an index below the caller's count. A count outside [0, max_views] is a
-// fault.
+// Returns how many of the launch's views are drawn: those with an index below *task.view_count. A count outside [0,
+// max_views] is a fault.
 __device__ inline int32_t num_drawn_views(const DrawTask& task) {
   if (task.view_count == nullptr) return task.num_views;
   const int32_t count = *task.view_count, drawn = clamp(count, 0, task.max_views);

@@ -258,7 +258,7 @@ __device__ __noinline__ bool plan_next_part(Part whole, Part part, bool is_drawn
     if (columns == whole.num_columns() && rows == whole.num_rows()) plan = {whole.x_begin, columns, columns, rows};
     int x = part.x_begin, y = part.y_begin;
     if (is_drawn) {
-      // The next part is in the same row of parts, else in the next row of the vertical band, else in the next band.
+      // The next part is to the right within the band, else below in the band, else at the top of the next band.
       const int band_end = min_of(plan.band_begin + plan.band_px, whole.x_end);
       x = part.x_end;
       if (x == band_end) {

@@ -33,8 +33,8 @@ __device__ inline RowRange rows_of(const BlockState& state, uint32_t object_id) 
   return rows;
 }
 
-// Adds an object's weights in the prepared image to the thread's sums: among all objects, then alone. Returns false if
-// the image does not fit into memory. Collective over the block.
+// Adds an object's weights in the prepared image to the thread's sums: first drawn among all objects, then drawn alone.
+// Returns false if the image does not fit into memory. Collective over the block.
 __device__ inline bool accumulate_visibility(BlockState* state, uint32_t object_id, VisibilitySum* sum_inout) {
   const RowRange rows = rows_of(*state, object_id);
   const int num_faces = state->num_faces;

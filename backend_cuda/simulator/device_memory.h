@@ -242,7 +242,7 @@ struct DeviceScratch {
   DeviceBuffer<RuleOptions> options;
   DeviceBuffer<WorldView> worlds, next_worlds;
   DeviceBuffer<cuda::WorldScratch> of_worlds;
-  DeviceBuffer<int32_t> cell_begin, cell_items;  // one cell per world, of all boxes
+  DeviceBuffer<int32_t> cell_begin, cell_items;  // one cell per world, with all its boxes
   DeviceBuffer<Vec2> cell_centers;
   DeviceBuffer<AgentBox> try_boxes;
   DeviceBuffer<uint32_t> free_tries;

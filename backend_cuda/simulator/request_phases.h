@@ -38,7 +38,7 @@ struct CheckRequest {
   }
 };
 
-/// Writes an edit without faults.
+/// Writes an edit if it has no faults; otherwise keeps the first fault.
 struct ApplyEdit {
   CheckRequest<StateEdit> check;
   template <typename Atomics>

@@ -23,8 +23,9 @@ Snapshot make_synthetic_town(uint64_t seed, int num_agents);
 /// Makes a crowd of 900 people, seen from above and the side. Its faces exceed a CUDA block's shared memory.
 Snapshot make_crowd();
 
-/// Four worlds: the second town, the first town without agents (one view), the first town, and the second town without
-/// lights. All worlds but the one without agents have three views each, which hide different thirds of the vehicles.
+/// Four worlds of two synthetic towns: the second town, the first town without agents (one view), the first town, and
+/// the second town without lights. All worlds but the one without agents have three views each, which hide different
+/// thirds of the vehicles.
 struct SyntheticWorlds {
   std::vector<StaticGeometry> maps;
   SceneOwner scene;

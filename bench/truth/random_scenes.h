@@ -12,7 +12,7 @@ enum class RandomKind {
   bridge_from_below,   // cars and walls on a bridge or a ramp, seen from the road below
   crashed_boxes,       // boxes driven into each other, with faces in one plane
   intersecting_walls,  // walls that cross each other, partly behind boxes
-  wide_strips,         // strips widened by 2 to 8 px up to the horizon and beyond
+  wide_strips,         // strips widened to at least 2, 4 or 8 px, up to the horizon and beyond
   walls_on_strips,     // walls whose lower edge is up to 40 cm below their strips
   level_edges,         // level edges of walls and boxes, one closely above the other
 };

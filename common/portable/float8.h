@@ -9,8 +9,7 @@
 
 namespace pictura {
 
-// (delete; the next sentence says all of it) Two types, because programs may mix code with and without AVX2, and the
-// two kinds of code pass the types differently.
+// Two types, because programs may mix code with and without AVX2, and the two kinds of code pass the types differently.
 #if defined(__AVX2__) && !defined(__CUDACC__)
 inline namespace float8_in_a_register {
 

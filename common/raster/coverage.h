@@ -67,8 +67,9 @@ PICTURA_HD inline SampleRange whole_range() {
 /// Summand that moves a height to the lowest bits of a float's mantissa. The height is divided by kLines_rows
 /// (edges.h).
 constexpr float kToLowestBits = 1 << 8;  // the lowest bit is 1 / (kLines_rows * kRowUnits)
-/// For each column, an edge's height relative to the first column right of the pixel's centre, minus 2^14. narrow()
-/// adds the height in that column, where 2^14 is the pixel's centre, so sums are relative to the centre.
+/// For each column, an edge's height minus its height in the first column right of the pixel's centre, minus 2^14.
+/// narrow() adds the height in that column. There, the pixel's centre has the height 2^14, so sums are relative to the
+/// centre.
 PICTURA_HD inline Int16x8 column_heights(const PolygonEdge& edge) {
   return arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
 }

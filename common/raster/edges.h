@@ -43,8 +43,8 @@ constexpr float kLevel_px = 1e-6f, kUpright_px = 1e-6f;
 constexpr int kSampleColumns = kInt16x8Size, kSampleRows = 8;
 /// Sample tests use 16-bit heights, kRowUnits per row, relative to the pixel's centre. Heights are clamped to
 /// +-kLines_rows / 2 in the first column right of the centre. They change by at most kSteepest rows per column, so 16
-/// bits do not overflow. Steeper lines get this slope. With their own slope, upright lines would quantize areas to
-/// eighths of the pixel.
+/// bits do not overflow. Steeper lines get this slope. With their own slope, upright lines would cut off whole columns
+/// of samples, that is, eighths of the pixel.
 constexpr int kRowUnits = 128;
 constexpr float kLines_rows = 256.0f, kSteepest = 9.0f;
 
@@ -63,8 +63,8 @@ PICTURA_HD inline PolygonEdge make_edge(Vec2 from, Vec2 to) {
   // Reduces the slope of steep lines. They still cross the height of the pixel's centre at the same x.
   const float shrink = is_level ? 1.0f : min_of(kSteepest * fabsf(dx_dy), 1.0f);
   const float scale = shrink * (0.5f * kSampleRows / kLines_rows), step_rows = shrink * edge.dy_dx;
-  // rows_scale and rows_offset map the sum of the line's heights at both sides of the pixel. The result is the height
-  // in the first column right of the centre, as a fraction of kLines_rows. 0.5 is the pixel's centre.
+  // rows_scale and rows_offset map the sum of the line's heights at both sides of the pixel to one height. The result
+  // is the height in the first column right of the centre, as a fraction of kLines_rows. 0.5 is the pixel's centre.
   edge.rows_scale = (dx > 0.0f) == downward ? scale : -scale;
   edge.rows_offset = 0.5f - scale + step_rows * (0.5f / kLines_rows);
   edge.rows_step = static_cast<int32_t>(floorf(step_rows * kRowUnits + 0.5f));

@@ -44,7 +44,7 @@ PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
 }
 
 /// Minimum area of a face in a pixel. A strip is ignored where it adds less than kMinWeight to every channel. A strip's
-/// minimum is at most kMaxSparedArea, because dark strips may occlude bright strips.
+/// minimum area is at most kMaxSparedArea, because dark strips may occlude bright strips.
 constexpr float kMinArea = 1e-4f, kMinWeight = 2.0f / 255.0f, kMaxSparedArea = 0.125f;
 PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
   if (kind_of(primitive.object_id) != kStripKind) return kMinArea;

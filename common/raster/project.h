@@ -170,7 +170,7 @@ PICTURA_HD inline ClipClass project_quad(const PinholeCamera& camera, const Vec3
   *bounds = {};
   for (int i = 0; i < 4; ++i) bounds->add(corner[i], inverse_depth[i]);
   const bool is_inside_guard_band = bounds->are_within(camera, kGuardBand_px);
-  // These values are meaningless for a face that extends behind the near plane.
+  // The bounds are meaningless for a face that extends behind the near plane.
   if (nearest_m < kNear_m) return ClipClass::crossing;
   return !bounds->meet_image(camera) ? ClipClass::outside
                                      : (is_inside_guard_band ? ClipClass::inside : ClipClass::crossing);

@@ -102,7 +102,7 @@ PICTURA_HD inline bool first_side_separates(const GroundQuad& a, const GroundQua
   };
   const Interval of_a = project(a), of_b = project(b);
   // Smallest displacement after which the quads would only touch, times the side's length. It is positive even if one
-  // interval is a point within the other, as a wall's may be.
+  // interval is a point within the other, for example the interval of a wall.
   const float overlap = min_no_nan(of_a.high - of_b.low, of_b.high - of_a.low);
   const float length2_m2 = dot(side, side);
   return length2_m2 > 1e-12f && (overlap <= 0.0f || overlap * overlap <= kTouching_m * kTouching_m * length2_m2);
@@ -185,7 +185,7 @@ PICTURA_HD inline bool is_in_front(const ScreenFace& a, const ScreenFace& b, Vec
   const bool first = are_equal_depths(inverse_depth_a, inverse_depth_b) ? a.object_id < b.object_id
                                                                         : inverse_depth_a > inverse_depth_b;
   if (strip_a == strip_b) return first;
-  // Here, the depths put the solid below the strip. A solid that stands on the strip merely cuts into the road, so the
+  // The depths may put the solid below the strip. A solid that stands on the strip merely cuts into the road, so the
   // order is reversed.
   const bool is_strip_first = first == strip_a, is_from_below = is_strip_from_below(strip_a ? a : b);
   if (is_strip_first == is_from_below) return first;

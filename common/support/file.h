@@ -33,7 +33,7 @@ std::string cache_folder(const std::string& name);
 /// devices.
 std::optional<std::string> read_cached(const std::string& path);
 
-/// Writes a cached file, creating its folder. Ignores failures, because the user may not control the folder.
+/// Writes a cached file, creating its folder. Ignores failures, because the folder may be outside the user's control.
 void write_to_cache(const std::string& path, std::string_view bytes);
 
 /// Creates the folder and its parents. Throws Error unless it is then writable.

@@ -17,7 +17,8 @@ struct NamedOption {
 /// Changes of a key's value that a resumed run accepts. reported: any change, with a notice.
 enum class Resume { fixed, free, reported };
 
-/// Use of a key's value in evaluations. replaced: evaluations have a separate option.
+/// Use of a training run's value in evaluations. counts: evaluations use it. replaced: evaluations have a separate
+/// option.
 enum class Evaluation { counts, replaced };
 
 /// A key of a configuration file.

@@ -77,8 +77,8 @@ struct CornerMeasures {
   Estimate distance_m, corner_m, speed_mps, approach_mps, deceleration_mps2;
 };
 
-/// Statistics of one policy's runs of a case, or of differences within each pair. A difference subtracts less_policy's
-/// run of the same case, or the policy's own run of less_case. Estimates are over scenes.
+/// Statistics of one policy's runs of a case, or of differences within each pair. A difference is the policy's run
+/// minus less_policy's run of the same case, or minus the policy's own run of less_case. Estimates are over scenes.
 struct CornerRow {
   bool walls = true;
   CornerCase its_case = CornerCase::hidden;

@@ -55,8 +55,9 @@ struct CornerPair {
 /// Tolerances of similar states.
 constexpr float kSameDistance_m = 1, kSameSpeed_mps = 0.5f;
 /// Returns at most `count` pairs of similar states, ordered by hidden state. The two states of a pair have different
-/// egos or scenes. Takes pairs from all scenes in turn. Uses the first state of each ego and hidden vehicle. Uses each
-/// ego's approach to an empty corner in at most one pair, with its state most similar to that pair's hidden state.
+/// egos or scenes. Takes pairs from all scenes in turn. Of the hidden states with the same ego and hidden vehicle, uses
+/// only the first. An ego's approach to an empty corner is in at most one pair. Of its states, the one most similar to
+/// the hidden state is taken.
 std::vector<CornerPair> match_corners(const std::vector<CornerState>& hidden, const std::vector<CornerState>& empty,
                                       int64_t count);
 

@@ -13,8 +13,8 @@ namespace pictura {
 constexpr float kPathSpacing_m = 0.5f, kPathBefore_m = 10, kPathAfter_m = 40;
 constexpr int kPathOrigin = static_cast<int>(kPathBefore_m / kPathSpacing_m);
 constexpr int kPathPoints = kPathOrigin + static_cast<int>(kPathAfter_m / kPathSpacing_m) + 1;
-/// Minimum lengths of each hidden end and of the seen part. The visible share must reach kPathWhole at a point of the
-/// seen part.
+/// A usable path has a seen part between two hidden ends (PathPart). Minimum lengths of each end and of the seen part.
+/// The visible share must reach kPathWhole at a point of the seen part.
 constexpr float kPathHidden_m = 2, kPathSeen_m = 2, kPathWhole = 0.9f;
 /// Maximum length of each hidden end.
 constexpr float kPathEnd_m = 8;

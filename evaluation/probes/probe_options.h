@@ -23,8 +23,8 @@ struct ProbeOptions {
   // `checkpoint`.
   EvaluateOptions worlds;
   std::vector<std::string> policies;  // files, or names of the calling program's policies
-  // Element i creates the session of the calling program's policies[i]; empty for a file. Trailing elements may be
-  // missing.
+  // Element i creates the session of policies[i] if that is a policy of the calling program; empty for a file. Trailing
+  // elements may be missing.
   std::vector<std::function<std::unique_ptr<PolicySession>(const DriverOptions&)>> make_own_policies;
   int sample_steps = 10;  // steps between sampled states
   int batch = 4096;       // cases computed together, rounded up to whole passes; changes no result

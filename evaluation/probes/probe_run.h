@@ -79,8 +79,8 @@ struct ProbePair {
   int32_t measured_box = -1;  // box whose visibility is measured; -1: none (NaN)
 };
 
-/// Cases still to be drawn. Scenes' numbers of cases differ by at most one. A scene's cases spread evenly over its
-/// samples if every sample offers enough.
+/// Cases still to be drawn. The numbers of cases per scene differ by at most one. A scene's cases spread evenly over
+/// its samples if every sample offers enough.
 class CaseQuota {
  public:
   CaseQuota(int64_t cases, const ProbeOptions& options) : cases_(cases), options_(options) {}
@@ -117,8 +117,8 @@ class ProbeRun final : public EvaluationObserver {
   /// Adds pairs of the current frame. Responses are appended to the results in this order.
   void add_pairs(const ProbeFrame& frame, Span<const ProbePair> pairs);
 
-  /// Returns visibilities in the cameras of the first policy that reads images, or in the paper's cameras without such
-  /// a policy.
+  /// Returns visibilities in the cameras of the first policy that reads images, or in the paper's cameras if no policy
+  /// reads images.
   std::vector<float> visibility(const KeptScene& scene, const std::vector<View>& views,
                                 const std::vector<VisibilityQuery>& queries);
   /// scene: in the memory of device().

@@ -35,8 +35,8 @@ struct TakeoverStart {
 struct Takeover {
   int32_t steps = 0;     // driven steps; fewer than kTakeoverSteps after an infraction
   uint8_t ended_by = 0;  // Event bits
-  // sight_step: first step at which no wall hides TakeoverStart::user, even if removed, from the ego's front camera.
-  // input_step: first step with the user in the policy's images or vector observation. -1: none.
+  // sight_step: first step at which no wall hides the place of TakeoverStart::user (which may be removed) from the
+  // ego's front camera. input_step: first step with the user in the policy's images or vector observation. -1: none.
   int32_t sight_step = -1, input_step = -1;
   float sight_distance_m = std::numeric_limits<float>::quiet_NaN();  // at sight_step, between box centres
   std::array<float, kTakeoverSteps + 1> speed_mps, x_m, y_m;         // the ego's reference point

@@ -13,8 +13,8 @@
 namespace pictura {
 
 /// Parses a Lanelet2 file; repairs and throws as parse_opendrive() does. File coordinates are those of place_nodes().
-/// Affine copies (options.plan) also stretch the widths of lanes. docs/reference/lanelet2.md lists the elements that
-/// are read.
+/// Unlike in parse_opendrive(), options.plan also stretches the widths of lanes. docs/reference/lanelet2.md lists the
+/// elements that are read.
 RoadMap parse_lanelet2(std::string_view text, const std::string& source, const OpenDriveOptions& options = {},
                        const std::optional<GeoPoint>& origin = std::nullopt, const ImportProgress& progress = {});
 

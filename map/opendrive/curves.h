@@ -22,7 +22,7 @@ void measure(PlaneCubic* cubic);
 void measure(GeometryPiece* piece);
 
 /// Returns the pose at distance `ds` from the start of a piece. Spirals require an earlier measure(). On plane cubics,
-/// ds / length of the piece is the fraction of the cubic's arc length.
+/// the pose is at the fraction ds / piece.length of the cubic's arc length.
 Pose pose_on(const GeometryPiece& piece, double ds);
 
 /// Clamps s to the road.

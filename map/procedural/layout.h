@@ -71,7 +71,7 @@ inline double lane_offset_m(const Street& street, int lane) {
   return (street.kind == StreetKind::motorway ? kHalfMedian_m : 0) + lane * street.lane_width_m;
 }
 
-/// Nodes in the order in which the inner carriageway passes them.
+/// Nodes of a motorway interchange, in the order in which traffic on the carriageway nearer to the town passes them.
 struct Interchange {
   int entry_fork = -1, overpass = -1, exit_fork = -1;
 };

@@ -24,7 +24,7 @@ struct TrackState {
 
 /// Simulator state of a saved simulation, for a bitwise identical replay.
 struct SavedMotion {
-  Vec3 reference_m;     // reference point of the road user's class
+  Vec3 reference_m;     // rear axle of a vehicle or cyclist, or centre of a pedestrian
   float speed_mps = 0;  // signed, along the heading
 };
 
@@ -97,7 +97,7 @@ struct Scenario {
   std::vector<int32_t> light_lanes;
   std::vector<RecordedLightState> light_states;  // [lights * num_steps]
   std::vector<ConversionNote> notes;
-  int32_t repaired_headings = 0;  // number of tracks whose first heading protocol_scene() replaced
+  int32_t repaired_headings = 0;  // number of tracks whose first heading was replaced by protocol_scene()
 
   Span<const TrackState> states_of(int32_t track) const {
     return {states.data() + first_of(track), static_cast<size_t>(num_steps)};

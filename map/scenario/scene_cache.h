@@ -18,14 +18,14 @@ struct SceneCacheKey {
   static constexpr int64_t kIndex = -2;
   // Hash of the scene's bytes; for kIndex, hash of the records' lengths and checksums.
   uint64_t content = 0;
-  // Index of the record; -1 if the file is the scene, kIndex for the file's list of records.
+  // Index of the record in a TFRecord file; -1 for a file that holds one scene; kIndex for a file's list of records.
   int64_t record = 0;
 };
 
 struct FieldFileKind {
   std::array<char, 8> magic{};
   uint32_t version = 1;    // version of the header
-  uint64_t layout = 0;     // hash of append_layout()'s text or of the importers
+  uint64_t layout = 0;     // hash of append_layout()'s text (native files) or of the importers' source code (cache)
   const char* other = "";  // message about a file of another layout
 };
 

@@ -116,7 +116,8 @@ class NetworkPasses {
   NetworkPasses(const NetworkPasses&) = delete;
   NetworkPasses& operator=(const NetworkPasses&) = delete;
 
-  /// Whether bias_gelu(), or norm() and bias_norm_gelu(), support this number of channels.
+  /// Whether a number of channels is supported: supports_gelu() by bias_gelu(), supports_norm() by norm() and
+  /// bias_norm_gelu().
   static constexpr bool supports_gelu(int64_t channels) { return channels % 8 == 0 && channels <= 1024; }
   static constexpr bool supports_norm(int64_t channels) {
     return channels % 64 == 0 && channels <= 512 && channels != 320 && channels != 448;

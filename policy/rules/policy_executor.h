@@ -16,7 +16,8 @@ class PolicyExecutor {
   PolicyExecutor& operator=(const PolicyExecutor&) = delete;
 
   virtual Device device() const = 0;
-  /// Free memory of a device; all memory of the host, because file caches can be freed.
+  /// On a device: free memory. On the host: all memory, because free memory would exclude file caches, which can be
+  /// freed.
   virtual int64_t memory_bytes() const = 0;
 
   /// Writes the slots for which asked(slot) is true, ascending, and returns their number. slots_out has room for all

@@ -101,8 +101,8 @@ PICTURA_HD int64_t find_edit_fault(const StateEdit& edit, int i, int num_slots, 
   return field == AgentField::none ? kNoEditFault : edit_fault(static_cast<int32_t>(field), i, slot);
 }
 
-/// Writes the agent of element i, which must be valid, without testing collisions on the way. Returns the change in the
-/// number of agents in the episode.
+/// Writes the agent of element i, which must be valid. Collisions between the old and the new place are not tested.
+/// Returns the change in the number of agents in the episode.
 PICTURA_HD inline int apply_edit(const WorldView& world, const StateEdit& edit, int i) {
   const AgentStateView& agents = world.agents;
   const int slot = edit.slots[i], agent = slot - world.first_slot;

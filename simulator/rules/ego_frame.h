@@ -10,7 +10,7 @@ namespace pictura {
 constexpr float kScalePosition_m = 120.0f, kScaleHeight_m = 10.0f, kScaleSpeed_mps = 20.0f;
 constexpr float kScaleLength_m = 6.0f, kScaleWidth_m = 3.0f, kScaleHalfPiece_m = 5.0f, kScaleLaneWidth_m = 5.0f;
 constexpr float kScaleWallHeight_m = 12.0f;
-constexpr float kMinConditioning = -2.0f;  // lower bound
+constexpr float kMinConditioning = -2.0f;  // lower bound of observed conditioning
 constexpr float kScaleSteer_rad = 0.55f, kScaleAccelLong_mps2 = 5.0f, kScaleAccelLat_mps2 = 4.0f;
 
 /// Reciprocal of a scale. A division would take ten times as long as a multiplication.

@@ -78,7 +78,7 @@ PICTURA_HD NextBox next_box(const WorldView& world, const AgentBox& own, RoutePo
   return group.of_lowest(next.gap_m, next_index, next);
 }
 
-/// Whether an agent with a lower index entered in this step through an entry with this `turn`.
+/// Whether an agent with a lower index entered in this step through an entry whose Entry::turn is `turn`.
 template <typename ThreadGroup>
 PICTURA_HD bool is_turn_taken(const WorldView& world, int agent, int step, int32_t turn, const ThreadGroup& group) {
   bool is_taken = false;

@@ -37,8 +37,8 @@ PICTURA_HD bool is_counted(const WorldView& world, int agent, const CommandType&
          driver_kind_of(world, agent) == 0;
 }
 
-/// Whether the agent counts as active in episode_ends(). Waiting agents do. Absent agents of a map with a record count
-/// too, because they may appear later; with replayed tracks, they never appear.
+/// Whether the agent counts as active in episode_ends(). Waiting agents do. On a map with a record but no replayed
+/// tracks, absent agents count too, because they may appear later.
 PICTURA_HD inline bool keeps_episode(const WorldView& world, int agent) {
   const auto status = world.agents.status[world.first_slot + agent];
   if (has_replayed_tracks(world.map)) return takes_actions(status);

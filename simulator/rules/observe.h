@@ -324,7 +324,7 @@ PICTURA_HD inline void observe(const WorldView& world, int begin, int end, bool 
                                const ObservationView& out) {
   for (int agent = begin; agent < end; ++agent) observe_own(world, agent, world.first_slot + agent, out);
   if (!entity_sets) return;
-  constexpr int kBlock = 128, kAhead = 2;  // agents; agents to prefetch ahead
+  constexpr int kBlock = 128, kAhead = 2;  // agents per block; prefetch distance in agents
   NearPlace places[kBlock];
   for (int first = begin; first < end; first += kBlock) {
     const int count = min_of(kBlock, end - first);

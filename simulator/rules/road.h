@@ -9,7 +9,8 @@ namespace pictura {
 
 /// Margin on both sides of each lane, to cover gaps between lanes.
 constexpr float kSeamTolerance_m = 0.1f;
-/// Offset of an agent on no lane, as in the paper's reference implementation. The angle is a right angle.
+/// Offset of an agent on no lane, as in the paper's reference implementation. The angle of such an agent is a right
+/// angle.
 constexpr float kNoLaneOffset_m = 4.0f;
 
 /// Position of an agent relative to its lane.

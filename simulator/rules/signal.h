@@ -20,9 +20,9 @@ struct LightPlan {
 
 /// Draws a stop line's plan for an episode. By default (training), each junction has green U(1, 10) s, yellow U(1.5,
 /// 2.25) s, red U(0.3, 10) s and a time offset. In a fifth of the episodes all lights are off; in the others, a fifth
-/// of the lights are off. Independent cycles are drawn for each light; a light that is not off is always green with
-/// probability 0.05. With `fixed` (evaluation), durations are 10, 3 and 2 s, and only the offset is drawn. A line that
-/// belongs to no junction has its own cycle.
+/// of the lights are off. Independent cycles are drawn for each light; with probability 0.05, a light that is not off
+/// stays green throughout the episode. With `fixed` (evaluation), durations are 10, 3 and 2 s, and only the offset is
+/// drawn. A line that belongs to no junction has its own cycle.
 PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light, LightCycles cycles, bool fixed,
                                             float dt_s, uint64_t seed, uint32_t world, uint32_t episode) {
   constexpr float kOffFraction = 0.2f, kAlwaysGreenFraction = 0.05f;
@@ -128,11 +128,11 @@ PICTURA_HD inline bool is_lane_change(const MapView& map, int32_t before, int32_
   return before >= 0 && after >= 0 && before != after && !follows(map, before, after) && !follows(map, after, before);
 }
 
-/// Whether the step violates stop line `light`. `state` is the light's state during the step, observed before it. With
-/// a red light, two events violate the line: the front bumper crosses it, or an agent past it changes from a lane
-/// without a light to a lane of this light. The agent must be on the line's level, within 45 degrees of its direction,
-/// and within 10 m of its middle. An agent that is on the line when it turns red may clear the junction and enter the
-/// next lane of its route.
+/// Whether the step violates stop line `light`. `state` is the light's state during the step, which agents observed
+/// before the step. With a red light, two events violate the line: the front bumper crosses it, or an agent past it
+/// changes from a lane without a light to a lane of this light. The agent must be on the line's level, within 45
+/// degrees of its direction, and within 10 m of its middle. An agent that is on the line when it turns red may clear
+/// the junction and enter the next lane of its route.
 PICTURA_HD inline bool violates(const MapView& map, int32_t light, const Crossing& crossing, LightState state) {
   if (state != LightState::red) return false;
   const StopLine& line = map.stop_lines[light];

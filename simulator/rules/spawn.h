@@ -28,7 +28,8 @@ PICTURA_HD inline RandomStream agent_stream(const WorldView& world, int agent, u
                        .purpose = purpose});
 }
 
-/// Random stream of a goal chain. Keys of different lives differ, because a life of n steps draws fewer than n chains.
+/// Random stream of a goal chain. The key is the life's first step plus the chain's index; keys of different lives
+/// differ, because a life of n steps draws fewer than n chains.
 PICTURA_HD inline RandomStream goal_stream(const WorldView& world, int agent, int32_t chain) {
   const int32_t life_step = world.agents.life_step[world.first_slot + agent];
   return agent_stream(world, agent, static_cast<uint32_t>(life_step) + static_cast<uint32_t>(chain), Purpose::goals);
@@ -94,7 +95,7 @@ PICTURA_HD inline AgentBox with_clearance(AgentBox box) {
   return box;
 }
 
-/// Maximum distance between the centres of `inflated`, a result of with_clearance(), and a box that overlaps it.
+/// Maximum distance from the centre of `inflated` (from with_clearance()) to that of an overlapping box.
 PICTURA_HD inline float clearance_reach_m(const MapView& map, const AgentBox& inflated) {
   return radius(inflated) + map.max_box_radius_m;
 }

@@ -54,7 +54,7 @@ Communicator* single_communicator();
 /// it. Throws Error if this build or machine lacks the library.
 std::unique_ptr<Communicator> make_communicator(Ranks* ranks, Device device);
 
-/// Variants for any number of ranks.
+/// Create Gloo's or NCCL's communicator, even of a single rank.
 std::unique_ptr<Communicator> make_gloo_communicator(Ranks* ranks);
 std::unique_ptr<Communicator> make_nccl_communicator(Ranks* ranks, Device device);
 

@@ -1,5 +1,5 @@
 // Advantage filter (paper, appendix, optimization; after Gigaflow): drops transitions with a small |advantage|. The
-// threshold is an average over rollouts: of a fraction of the largest |advantage|, or of a quantile.
+// threshold is a fraction of the largest |advantage|, or a quantile of |advantages|, averaged over rollouts.
 #pragma once
 
 #include <algorithm>

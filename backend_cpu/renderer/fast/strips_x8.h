@@ -1,5 +1,5 @@
-// Set-up of eight strips in parallel (SIMD), like the functions of common/raster from strip_quad() to
-// is_quad_visible(); it makes no edges.
+// Set-up of eight strips in parallel (SIMD): the steps of common/raster from strip_quad() to is_quad_visible(), without
+// edges.
 #pragma once
 
 #include <cstddef>

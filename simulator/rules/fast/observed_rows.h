@@ -37,8 +37,8 @@ static_assert(offsetof(AgentBox, cos_heading) == 3 * sizeof(float) &&
 static_assert(offsetof(StopLine, right_m) == 3 * sizeof(float) && sizeof(StopLine) >= 8 * sizeof(float));
 #endif
 
-// Functions without a Float8 parameter do not return a Float8. Mangled names contain no return types, and a program may
-// contain two types named Float8.
+// Functions without a Float8 parameter do not return a Float8. Reason: a program may contain two types named Float8,
+// and a mangled name does not show which of them a function returns.
 
 /// Writes the row of one of the nearest boxes.
 PICTURA_HD inline void write_partner(const AgentBox& box, float speed_mps, const RowFrame& frame, float* row_out) {

@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// Maximum number of items beyond `capacity`.
+/// Maximum number of items that find_pieces_in_sight() writes beyond `capacity`.
 constexpr int kFoundBeyond = 8;
 
 /// Writes the visible `items` in order, and returns their number. Stops when at least `capacity` are found. found_out
