@@ -176,7 +176,7 @@ def make_vec_for(policy, maps="procedural:3", num_agents: int = 16, **options):
         >>> envs = pictura.make_vec_for("models/perspective.safetensors", "procedural:3", num_agents=4)
         >>> observations, infos = envs.reset(seed=1)
         >>> observations["rgb"].shape
-        (4, 4, 3, 18, 32)
+        (4, 4, 3, 54, 96)
     """
     DriveVectorEnv = _vector_env()
     path = policy if isinstance(policy, (str, os.PathLike)) else getattr(policy, "metadata", {}).get("path")
