@@ -17,8 +17,8 @@ std::string first_difference(const Config& saved, const Config& now);
 /// Returns the first difference that ranks (processes) of a run must not have, in the same form.
 std::string first_difference_of_ranks(const Config& first, const Config& other);
 
-/// Returns the differences that a resumed run should report, as "KEY: OLD became NEW". RunKeeper::begin() reports a
-/// change of the optimizer.
+/// Returns the differences that a resumed run should report, as "KEY: OLD became NEW". A change of the optimizer is not
+/// among them; RunKeeper::begin() reports it.
 std::vector<std::string> differences_to_report(const Config& saved, const Config& now);
 
 /// Returns the keys that evaluations use, with their values as in to_toml(). They include keys of the policy if

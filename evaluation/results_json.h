@@ -27,7 +27,8 @@ Counts counts_from(const Json& json) {
   return counts;
 }
 
-/// Throws Error naming both parts and the first different key, such as "rules.box_scale". `within`: prefix of the key.
+/// Throws Error if the two objects differ, naming both and the first different key, such as "rules.box_scale".
+/// `within`: prefix of the key.
 void check_same(const Json& first, const std::string& first_name, const Json& other, const std::string& other_name,
                 const std::string& within = "");
 

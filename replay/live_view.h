@@ -19,7 +19,7 @@ struct LiveViewOptions {
   int port = 0;  // 0: any free port
   // If set, listens on all addresses, and accepts requests to this host name.
   std::string host_name;
-  int watched = 0;             // initial agent whose decisions and images are sent
+  int watched = 0;             // agent whose decisions and images are sent first; pages may choose another
   RendererConfig cameras;      // cameras of every agent
   bool sends_images = false;   // else pages draw images
   bool waits_for_page = true;  // the first step waits for a page

@@ -22,18 +22,18 @@ class RolloutObservations {
   /// Replaces the renderer by one with equally many cameras, and discards kept images.
   void set_renderer(Renderer* renderer);
 
-  /// Records the simulator's present observations as those of `step`. slots: i64 [n], whose images are kept. The first
-  /// rollout must record its steps in order.
+  /// Records the simulator's present observations as those of `step`. slots: i64 [n], the slots whose images are kept.
+  /// The first rollout must record its steps in order.
   void record(int64_t step, const at::Tensor& slots);
 
-  /// Returns the observations of rows: i64 [batch], step * num_slots + slot. Their agents must have been active.
-  /// patch_px: see draw_images(); kept images ignore it.
+  /// Returns the observations of the given rows. rows: i64 [batch], each step * num_slots + slot. Their agents must
+  /// have been active. patch_px: see draw_images(); kept images ignore it.
   Observation gather(const at::Tensor& rows, int patch_px = 0) const;
 
   bool keep_images() const { return kept_images_ != nullptr; }
   bool draws_when_gathered() const { return scenes_ != nullptr; }
-  /// Whether every step has been recorded. From then on, gather() reuses its memory until generation() changes. So does
-  /// record() if images are not kept.
+  /// Whether every step has been recorded. From then on, gather(), and record() without kept images, reuse their memory
+  /// until generation() changes.
   bool are_complete() const { return are_complete_; }
   /// Number of times that memory of images has moved.
   uint64_t generation() const {

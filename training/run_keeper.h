@@ -18,8 +18,8 @@ namespace pictura {
 /// function, because a checkpoint contains data of each rank.
 class RunKeeper {
  public:
-  /// Claims the folder. Throws Error about the folder as train() does. Throws Error naming a file of the run that is a
-  /// link. The arguments must outlive the object.
+  /// Claims the folder. Throws Error about the folder as train() does. Throws Error if a file of the run is a link; the
+  /// message names it. The arguments must outlive the object.
   RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* communicator);
 
   /// Starts the run from its last checkpoint, another run's weights, or new weights, as the options specify. An

@@ -43,8 +43,9 @@ PICTURA_HD constexpr uint16_t instance_of(const ScreenFace& face) {
   return static_cast<uint16_t>(kind_of(face.object_id) == kAgentKind ? 1 + index_of(face.object_id) : 0);
 }
 
-/// Minimum area of a face in a pixel. A strip is ignored where it adds less than kMinWeight to every channel. A strip's
-/// minimum area is at most kMaxSparedArea, because dark strips may occlude bright strips.
+/// Minimum area of a face in a pixel. A strip is ignored where it adds less than kMinWeight to every channel. A dark
+/// strip's minimum area is limited to kMaxSparedArea, because a larger fragment may occlude a visible part of a bright
+/// strip.
 constexpr float kMinArea = 1e-4f, kMinWeight = 2.0f / 255.0f, kMaxSparedArea = 0.125f;
 PICTURA_HD inline float min_area_of(Rgb color, PrimitiveRef primitive) {
   if (kind_of(primitive.object_id) != kStripKind) return kMinArea;

@@ -12,7 +12,7 @@ namespace pictura {
 
 constexpr std::string_view kSceneFileEnding = ".scenario";
 
-/// Kind of native files, which have a default SceneCacheKey.
+/// Kind of native scene files. Their SceneCacheKey is SceneCacheKey{}.
 FieldFileKind scene_file_kind();
 
 /// Writes the file completely or not at all. Throws UsageError for a name without kSceneFileEnding. Throws Error, which

@@ -24,8 +24,8 @@ PICTURA_HD constexpr ClassLimits class_limits(AgentClass agent_class) {
   }
 }
 
-/// Maximum speed of any class. Recorded traffic may exceed this limit and the next, so rules use MapView::max_speed_mps
-/// and MapView::max_box_radius_m.
+/// Maximum speed of any class. Recorded traffic may exceed kMaxSpeed_mps and kMaxBoxRadius_m, so rules use
+/// MapView::max_speed_mps and MapView::max_box_radius_m.
 constexpr float kMaxSpeed_mps = 20.0f;
 /// Maximum half-diagonal of any class.
 constexpr float kMaxBoxRadius_m = 3.2f;
