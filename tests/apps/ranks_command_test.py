@@ -13,7 +13,7 @@ import subprocess
 import time
 import unittest
 
-from command_case import PICTURA, TINY, CommandCase, run
+from command_case import CONFIGS, PICTURA, TINY, CommandCase, run
 
 
 def free_port():
@@ -90,6 +90,10 @@ class Ranks(CommandCase):
 
     def test_two_that_hold_actions_train_as_one_does(self):
         self.assert_two_train_as_one("--set", "policy.decision_steps=2")
+
+    def test_two_that_train_among_opponents_train_as_one_does(self):
+        opponent = CONFIGS.parent / "models/vector.safetensors"
+        self.assert_two_train_as_one("--set", f'simulator.others.policies=["{opponent}=0.3"]')
 
     def assert_two_train_as_one(self, *settings):
         one = ["--set", "train.updates=1", *self.GRADIENTS, "--set", "train.adv_filter_threshold=0.2", *settings]
