@@ -151,8 +151,8 @@ def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, p
     
     Returns a dict. `rows` has one dict for each density, with metrics as (value, half width of the 95 % interval). `agents`
     has one dict for each driven road user in each scene, density and rollout. `realism`, if requested, is the result of
-    pictura.realism.score_file(). The other names are scenes, scored, without_drivers, faults (skipped scenes with reasons),
-    seconds, agent_steps and policy_hash.
+    pictura.realism.score_file(). The other names are scenes, scored, without_drivers, repaired_headings (by the
+    rule max_first_turn_deg), faults (skipped scenes with reasons), seconds, agent_steps and policy_hash.
     
     checkpoint: file of a policy; '' with `controller`.
     scenes: files, folders, or 'FILE#K' for scene K of a file.
