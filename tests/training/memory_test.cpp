@@ -57,6 +57,16 @@ TEST_P(EachRollout, TakesAboutWhatIsEstimated) {
   EXPECT_LT(by_estimate, 1.2 * per_agent) << per_agent << " bytes";
 }
 
+TEST(Memory, ReplayedTracksOfScenesAreCounted) {
+  Config config = config_of("vector", "auto", 240);
+  const double in_towns = estimated_bytes(config, true);
+  config.simulator.maps = {"scenes:any"};
+  config.simulator.scenes.max_replayed = config.simulator.parked_cars;
+  EXPECT_EQ(estimated_bytes(config, true), in_towns);
+  config.simulator.scenes.max_replayed += 96;
+  EXPECT_GT(estimated_bytes(config, true), in_towns);
+}
+
 TEST(Memory, MoreAgentsThanFitAreRefusedWithTheNumberThatWould) {
   const auto config = [](int num_slots) { return config_of("perspective", "kept", num_slots); };
   const Config any = config(250);
