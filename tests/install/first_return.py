@@ -45,7 +45,8 @@ def main() -> None:
         packages = next(folder.glob("env/lib/python*/site-packages"))
         if not arguments.torch:
             # Found after the environment's own packages.
-            (packages / "torch_of_this_python.pth").write_text("\n".join(site.getsitepackages()) + "\n")
+            folders = [*filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep)), *site.getsitepackages()]
+            (packages / "packages_of_this_python.pth").write_text("\n".join(folders) + "\n")
         parts["environment"] = time.monotonic() - start
         if arguments.build:
             shutil.copytree(ROOT / "bindings/pictura", packages / "pictura", ignore=shutil.ignore_patterns("__pycache__"))
