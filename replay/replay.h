@@ -107,7 +107,7 @@ enum class ShapeKind : uint8_t {
   stop_line,      // line
   road_edge,      // line
   wall,           // line
-  // Both ends of the stop line, the head, and a point one metre in front of the head. In the map's order.
+  // Both ends of the stop line, the head, and a point one metre in front of the head; lights in the map's order.
   light,
 };
 constexpr int kNumShapeKinds = 8;

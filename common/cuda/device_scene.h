@@ -82,7 +82,7 @@ class DeviceImages {
     return {current_device(), host.format, host.num_views, cameras_, host.order, host.patch_px};
   }
 
-  /// All colour that like() allocated.
+  /// Returns the bytes of all colour images, which like() allocated.
   Span<uint8_t> color_bytes() const { return color_bytes_; }
 
   /// Copies the images to host images, which may have fewer views, on the stream.
