@@ -10,7 +10,7 @@
 
 namespace pictura {
 
-/// Statistics of a group's valid transitions.
+/// Statistics of a group's valid transitions with new decisions.
 struct AgentGroup {
   double kept_share = 0;      // kept by the advantage filter
   double mean_advantage = 0;  // before normalisation
@@ -22,8 +22,8 @@ struct AgentGroups {
   AgentGroup rest, moving;
 };
 
-/// Groups the valid transitions of all ranks' rollouts, whose advantages must have been computed. The filter keeps
-/// transitions with |advantage| >= adv_threshold. Values of an empty group are NaN.
+/// Groups the valid transitions with new decisions of all ranks' rollouts, whose advantages must have been computed.
+/// The filter keeps transitions with |advantage| >= adv_threshold. Values of an empty group are NaN.
 AgentGroups group_agents(const Rollout& rollout, double adv_threshold,
                          Communicator* communicator = single_communicator());
 
