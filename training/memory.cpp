@@ -64,8 +64,7 @@ double estimated_bytes(const Config& config, bool keeps_images) {
   const SimulatorSection& section = config.simulator;
   const double agents = section.num_slots, steps = config.train.num_steps;
   const double worlds = 2 * agents / (section.min_agents + section.max_agents),
-               boxes = agents +
-                       worlds * (config.simulator.has_scenes() ? section.scenes.max_replayed : section.parked_cars);
+               boxes = agents + worlds * training_world(config, Device{}).parked_cars;
   // Observations of steps + 2 steps: one step in the simulator, and steps + 1 in the rollout.
   double bytes =
       boxes * kSimulatorBytesPerBox + agents * (observation_bytes(config) * (steps + 2) + kTransitionBytes * steps);
