@@ -14,7 +14,7 @@ namespace pictura {
 
 class McapWriter {
  public:
-  /// All functions that write throw Error naming the path.
+  /// Every function that writes throws Error naming the path.
   McapWriter(const std::string& path, std::string_view library);
 
   /// Adds a topic with a JSON Schema. Returns its channel.

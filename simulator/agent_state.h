@@ -1,4 +1,4 @@
-// All agents' fields (fields.h) in host memory.
+// Fields of all agents (fields.h), in host memory.
 #pragma once
 
 #include <vector>

@@ -16,7 +16,7 @@ struct ObservationArray {
   ObservationPart part;
 };
 
-/// All possible arrays.
+/// Descriptions of all observation arrays.
 constexpr ObservationArray kObservationArrays[] = {
 #define X(name, type, rows, features, part, comment) {#name, element_type<type>(), rows, features, part},
     PICTURA_OBSERVATION_ARRAYS(X)

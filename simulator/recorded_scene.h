@@ -41,7 +41,7 @@ WorldSpec scene_world(const CompiledMap& map, int index = 0, uint32_t global_wor
 /// car), vehicles (other vehicles), others (all except vehicles), all, tracks_to_predict, objects_of_interest, and
 /// track ids. Throws UsageError for other words, but not for words that select no track.
 std::vector<uint8_t> tracks_selected_by(const Scenario& scenario, const std::string& words);
-/// As tracks_selected_by(), but also throws UsageError for a word that selects no track.
+/// Returns the same as tracks_selected_by(). Also throws UsageError for a word that selects no track.
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words);
 /// As tracks_of(), but without tracks that are absent at a step. Also throws UsageError if no track remains.
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words, int32_t step);

@@ -62,7 +62,7 @@ struct HardScene {
 };
 std::vector<HardScene> hard_scenes();
 
-/// All images of a batch, camera by camera.
+/// Images of a batch, camera by camera.
 struct Outputs {
   std::vector<float> color;
   std::vector<float> depth_m;

@@ -14,7 +14,7 @@ namespace pictura {
 
 enum class PedestrianControl : uint8_t {
   none,
-  nobody,     // control: no pedestrian, so no response may change
+  nobody,     // control: no pedestrian is inserted, so no response may change
   untrained,  // control: the policies have fresh weights
 };
 constexpr std::array<const char*, 3> kPedestrianControlNames{"none", "nobody", "untrained"};

@@ -14,7 +14,7 @@ namespace pictura {
 /// Road user that is hidden in a case.
 enum class RemovalControl : uint8_t {
   none,       // the case's user
-  nobody,     // control: no user is hidden, so no response may change
+  nobody,     // control: no road user is hidden, so no response may change
   permuted,   // control: another road user near the ego, drawn at random; none if there is no other
   untrained,  // control: the case's user; the policies have fresh weights
 };
