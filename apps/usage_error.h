@@ -8,7 +8,7 @@
 namespace pictura {
 
 /// Returns one line about the error of parse(). An unknown word is reported before other errors, with the nearest known
-/// word, or with why this build lacks the word.
+/// word, or with what this build lacks.
 std::string usage_error(const CLI::App& app, const CLI::ParseError& error);
 
 }  // namespace pictura

@@ -8,8 +8,8 @@
 
 namespace pictura::gl {
 
-/// Bounds on the quotient corner depth / plane depth: a strip's corner, and FaceInstance::compared_plane at the same
-/// screen point. Beyond the plane's horizon, the minimum applies. The maximum is that of the CPU renderer.
+/// Bounds on the depth of a strip's corner divided by the depth of FaceInstance::compared_plane at the same screen
+/// point. Beyond the plane's horizon, the minimum applies. The maximum is that of the CPU renderer.
 constexpr float kMinInverseDepth = 1e-4f, kMaxInverseDepth = kWidenedDepth;
 
 /// A flat quadrilateral in camera coordinates: one instance of the draw call.

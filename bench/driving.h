@@ -22,7 +22,7 @@ struct DrivenOptions {
 
 struct DrivenWorlds {
   std::unique_ptr<Simulator> simulator;
-  std::vector<View> views;  // spawned agents' views, one per world in turn
+  std::vector<View> views;  // views of spawned agents, from each world in turn
 };
 
 /// Makes and drives enough worlds for num_views views. The worlds use the maps in turn. Throws Error if a map cannot be

@@ -17,7 +17,7 @@ struct HistoryCase {
   Rig rig = paper_rig();
   int warm_up_steps = 60, num_steps = 128;  // random steps before the history, and in the history
   int num_views = 8192;                     // per call
-  int checked_images = 8;                   // from different steps, before and after timing
+  int checked_images = 8;                   // images of different steps, checked before and after timing
   int repeats = 7;
   double repeat_s = 1.0;  // approximate, for each kind of call
 };

@@ -21,8 +21,8 @@ struct SnapshotOptions {
   int num_threads = 0;  // 0: all
 };
 
-/// Drives a world with random actions. Views are those of spawned agents, at even intervals. A tenth of the agents are
-/// cyclists, and a tenth pedestrians. Throws Error if the map cannot be read or no agent can be spawned.
+/// Drives a world with random actions. The views are evenly spaced in the list of all spawned agents' views. A tenth of
+/// the agents are cyclists, and a tenth pedestrians. Throws Error if the map cannot be read or no agent can be spawned.
 Snapshot drive_snapshot(const SnapshotOptions& options);
 
 /// Errors against the truth, pooled over all images that are not blank.

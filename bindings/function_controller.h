@@ -28,9 +28,9 @@ std::function<std::unique_ptr<Controller>(const DriverOptions&, const Simulator&
     const py::function& function);
 
 /// Returns a function that makes sessions on the host. Their policy is `function`, with the default configuration and
-/// the options' cameras. If the function returns actions, the chosen one has probability 1 and the value is NaN. The
-/// returned function throws UsageError for devices other than the host, or if decision_steps is positive. Sessions
-/// throw as controllers do.
+/// the options' cameras. If `function` returns actions, each has probability 1 and the value is NaN. The returned
+/// function throws UsageError for devices other than the host, or if decision_steps is positive. Sessions throw as
+/// controllers do.
 std::function<std::unique_ptr<PolicySession>(const DriverOptions&)> function_sessions(const py::function& function);
 
 }  // namespace pictura::python

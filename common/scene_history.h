@@ -21,7 +21,8 @@ struct SceneHistorySize {
 /// devices and streams apply.
 class SceneHistory {
  public:
-  /// Throws Error without steps, or for more worlds, agents or lights than int32_t can count.
+  /// Throws Error if num_steps is less than 1, or if the history has more worlds, agents or lights than int32_t can
+  /// count.
   explicit SceneHistory(const SceneHistorySize& size);
   virtual ~SceneHistory() = default;
   SceneHistory(const SceneHistory&) = delete;
@@ -37,8 +38,9 @@ class SceneHistory {
   /// Returns the scene of all stored steps.
   virtual SceneBatch scene() const = 0;
 
-  /// Copies stored views, with indices into scene(). Row step * size().views + view selects a view of a step. Renderers
-  /// refuse copies of missing or invalid views. Throws Error unless rows and views_out have equal lengths.
+  /// Copies stored views, with their worlds and agents renumbered for scene(). Row step * size().views + view selects a
+  /// view of a step. Renderers refuse copies of missing or invalid views. Throws Error unless rows and views_out have
+  /// equal lengths.
   void gather(Span<const int64_t> rows, Span<View> views_out, Stream stream = {}) const;
 
  protected:

@@ -43,8 +43,8 @@ Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& s
 Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& scenario,
                        const RecordedTakeover& takeover, const RecordingOptions& recording);
 
-/// Writes the `count` worst scenarios and a gallery into a folder. Reports on stderr the files, and counts that differ
-/// from the evaluation's.
+/// Writes the `count` worst scenarios and a gallery into a folder. Reports the files on stderr, and the counts that
+/// differ from the evaluation's.
 void write_scenario_replays(const EvaluateOptions& options, const EvaluationResults& results,
                             const RecordingOptions& recording, int count, const std::string& folder);
 /// Writes the worst scenario into one file, and reports as write_scenario_replays() does.

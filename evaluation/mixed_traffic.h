@@ -43,7 +43,8 @@ class MixedTraffic {
   size_t num_drivers() const;
   /// Empty for driver 0.
   std::string name(size_t driver) const;
-  /// Returns the policy hash, or the name of the controller or impairment, of every other driver, with its share.
+  /// For each driver except driver 0, returns the policy hash, or the name of the controller or impairment, and the
+  /// share.
   std::vector<std::string> setting() const;
   /// Returns `world` with the observations that any driver reads, and the shares of impaired agents.
   SimulatorConfig adapted(SimulatorConfig world) const;

@@ -63,9 +63,9 @@ constexpr double kShortTimeToCollision_s = 0.95;
 /// Recorded scene prepared for scoring.
 class RealismScene {
  public:
-  /// The scored road users are the self-driving car and the tracks to predict, or all road users if the scene lists
-  /// none. They must be present at kRealismStart. Throws Error naming the scene if no step follows kRealismStart, no
-  /// road user is scored, or the time step is not 0.1 s.
+  /// The scored road users are the self-driving car and the tracks to predict, or all road users if there are no tracks
+  /// to predict. They must be present at kRealismStart. Throws Error naming the scene if no step follows kRealismStart,
+  /// no road user is scored, or the time step is not 0.1 s.
   explicit RealismScene(std::shared_ptr<const Scenario> scenario);
 
   const Scenario& scenario() const { return *scenario_; }

@@ -1,5 +1,5 @@
-// Robust protocol: a driver's performance in generated towns, among other drivers, and with randomized cameras. Only
-// the driver varies, so results are comparable.
+// Robust protocol: a driver's performance in generated towns, among other drivers, and with randomized cameras.
+// Evaluations differ only in the driver, so their results are comparable.
 #pragma once
 
 #include <functional>

@@ -24,8 +24,8 @@ struct LaneOpening {
 
 /// Ends of routes on a map's lanes.
 struct OpenLanes {
-  // [lanes] Length of the longest route after the end of the lane or of a lane beside it. Infinite for endless lanes
-  // and for lanes where is_route() is false.
+  // [lanes] Length of the longest route that begins at the end of this lane or at the end of a lane beside it. Infinite
+  // for endless lanes and for lanes where is_route() is false.
   std::vector<float> way_after_m;
   std::vector<LaneOpening> exits;  // at the ends of routes, except at missing links
   // At the starts of open lanes, if neither the lane nor a lane beside it has predecessors.

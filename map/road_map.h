@@ -58,7 +58,7 @@ struct Lane {
   int32_t junction = -1;
   IndexRange points;                                // in RoadMap::lane_points, at least two
   IndexRange successors, predecessors;              // in RoadMap::lane_links, which holds lane indices
-  int32_t left_neighbor = -1, right_neighbor = -1;  // driving or ramp, same direction; marks count in Lanelet2
+  int32_t left_neighbor = -1, right_neighbor = -1;  // same direction; Lanelet2: across borders that permit changes
   float length_m = 0;
   float speed_limit_mps = 0;
   // Indices of the road and the section in the file. source_lane is OpenDRIVE's lane id; in Lanelet2, it is 1, or -1

@@ -71,8 +71,8 @@ class Policy {
 class PolicyNetwork final : public Policy {
  public:
   /// Draws parameters that depend only on seed, parameter index and element index. Parameters of a program
-  /// (policy.backbone) come from its file. reads_walls: a vector policy encodes walls too. The host supports bf16
-  /// slowly, and computes in fp32 instead of tf32.
+  /// (policy.backbone) come from its file. reads_walls: a vector policy encodes walls too. On the host, bf16 is slow,
+  /// and fp32 replaces tf32.
   PolicyNetwork(const PolicySection& config, int num_cameras, uint64_t seed, at::ScalarType type = at::kFloat,
                 bool reads_walls = false, Device device = {}, Precision precision = Precision::fp32);
 

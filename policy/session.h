@@ -63,8 +63,9 @@ class PolicySession {
   PolicySession(const Config& config, const Rig& rig, Device device, const Policy& policy);
   explicit PolicySession(std::unique_ptr<SessionParts> parts);
   ~PolicySession();
-  /// Returns a session with an untrained policy of the same architecture, worlds and cameras. `seed` determines its
-  /// weights as in training, except those of a program (policy.backbone). Throws Error in builds without torch.
+  /// Returns a session with the same worlds and cameras, and an untrained policy of the same architecture. `seed`
+  /// determines its weights as in training, except those of a program (policy.backbone). Throws Error in builds without
+  /// torch.
   std::unique_ptr<PolicySession> make_untrained(uint64_t seed) const;
   PolicySession(const PolicySession&) = delete;
   PolicySession& operator=(const PolicySession&) = delete;

@@ -86,7 +86,7 @@ constexpr int kNumWaypoints = 3;
   X(halt_reason, uint8_t, 1, 0, "Event bits that halted it")                                                     \
   X(events, uint8_t, 1, 0, "Event bits of the last step")                                                        \
   X(goals_reached, int32_t, 1, 0, "last waypoints passed within 2 m in this episode")                            \
-  X(waypoints_reached, int32_t, 1, 0, "waypoints, goals too, passed within the reward's radius")                 \
+  X(waypoints_reached, int32_t, 1, 0, "waypoints (also goals) passed within the reward's radius")                \
   X(distance_m, float, 1, 0, "sum of |speed| dt in this episode")                                                \
   X(first_motion_step, int32_t, 1, 0, "first step (from 1) with a speed above kRest_mps; 0: none yet")           \
   X(episode_events, uint8_t, 1, 0, "union of the episode's event bits")                                          \

@@ -18,8 +18,8 @@ struct DynamicsRules {
 
 constexpr int kMaxOtherPolicies = 8;
 
-/// Shares of impaired agents and of agents that other policies drive, drawn in each episode. All remaining agents
-/// learn.
+/// Shares of agents that are impaired or driven by other policies; each episode draws these agents. All remaining
+/// agents learn.
 struct OtherShares {
   float blind = 0;            // at times sees no other road user
   float phantom_braking = 0;  // at times brakes hard

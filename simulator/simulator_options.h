@@ -11,7 +11,7 @@
 
 namespace pictura {
 
-/// In the order of Impairment.
+/// Visits the shares of impairments, in the order of Impairment.
 template <typename Shares, typename Visit>
 void visit_impairments(Shares&& shares, const Visit& visit) {
   visit("blind", shares.blind);

@@ -15,7 +15,7 @@ struct SimulatorState {
   explicit SimulatorState(const SimulatorSetup& setup) { resize(setup); }
   /// Sets initial values.
   void resize(const SimulatorSetup& setup);
-  /// A resize within the capacity then moves no array.
+  /// Reserves memory, so that a resize within the capacity moves no array.
   void reserve(const SimulatorCapacity& capacity, const SimulatorConfig& config);
 
   SpawnReport spawn_report(const SimulatorSetup& setup) const;

@@ -15,8 +15,8 @@ struct GradientNorms {
 /// Measurement on so few transitions that it takes at most 3 % of an update's work.
 class GradientDiagnosis {
  public:
-  /// first: first of `minibatches`, with advantages. The parameters' gradients must be 0, and are 0 again afterwards.
-  /// Does not wait for the device.
+  /// first: the first minibatch of `minibatches`, with advantages. The parameters' gradients must be 0, and are 0 again
+  /// afterwards. Does not wait for the device.
   void measure(const Minibatch& first, const Minibatches& minibatches, const LossFunction& loss,
                const TrainSection& config, const Learner& learner);
   /// Returns the norms over all ranks. Waits for the device.

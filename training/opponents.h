@@ -14,8 +14,8 @@ namespace pictura {
 
 class Opponents {
  public:
-  /// Reads the policies of simulator.others.policies. Throws Error naming a file that contains no policy. Throws Error
-  /// if a policy without images has auxiliary slots, but the learner has neither images nor auxiliary slots. Throws
+  /// Reads the policies of simulator.others.policies. Throws Error naming a file that contains no policy. If the
+  /// learner reads neither images nor auxiliary slots, throws Error for a vector policy with auxiliary slots. Throws
   /// Error if a policy's decision steps do not divide train.num_steps.
   Opponents(const Config& config, Device device, Communicator* communicator);
   ~Opponents();

@@ -32,8 +32,8 @@ class RolloutObservations {
 
   bool keep_images() const { return kept_images_ != nullptr; }
   bool draws_when_gathered() const { return scenes_ != nullptr; }
-  /// Whether every step has been recorded. From then on, gather(), and record() without kept images, reuse their memory
-  /// until generation() changes.
+  /// Whether every step has been recorded. From then on, until generation() changes, gather() uses memory at fixed
+  /// addresses, as does record() if images are not kept.
   bool are_complete() const { return are_complete_; }
   /// Number of times that memory of images has moved.
   uint64_t generation() const {

@@ -83,7 +83,7 @@ class RunLog {
   std::optional<ProgressCsv> evaluation_csv_;  // null if the run never evaluates
   double evaluation_s_ = 0;
   std::deque<RecentUpdate> recent_;
-  // Time since the start without evaluations, and the run's agent-steps at that time.
+  // Time since the start, excluding evaluations, and the run's agent-steps then.
   struct Moment {
     double s;
     int64_t agent_steps;

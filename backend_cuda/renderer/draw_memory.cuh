@@ -144,7 +144,7 @@ struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t, kDrawThreads> {
 static_assert(kMaxEntries <= kMaxMarkedFaces);
 static_assert(kMaxMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixels < 0x7FFF);
 
-// Drawing memory in global memory, shared with the lists of face set-up.
+// Global memory that holds the lists of face set-up, and later the arrays for drawing.
 __host__ __device__ inline size_t lay_out(SetupLists* lists, const Scratch& sizes, unsigned char* bytes) {
   lists->max_entries = FaceBatch::count_of(sizes.max_faces) * FaceBatch::kEntries;
   lists->max_clipped = sizes.max_faces;

@@ -25,8 +25,8 @@ class SortedPieces {
   float largest_radius_m_ = 0;
 };
 
-/// Makes a task without the renderer's own memory: geometries, pool, counters, lists of images and fault. `images` may
-/// be null.
+/// Makes a task without the renderer's own memory: geometries, pool, counters, fault word, and lists of images.
+/// `images` may be null.
 DrawTask make_draw_task(const RendererConfig& config, const std::vector<PinholeCamera>& cameras,
                         const SceneBatch& scene, const ViewBatch& views, const ImageBatch* images);
 

@@ -147,7 +147,7 @@ struct ImageWriter {
     for (int channel = 0; channel < 3; ++channel, to += patch_px * patch_px) {
       PICTURA_NO_UNROLL
       for (int row = 0; row < rows; ++row) {
-        // The pixels are already written, up to the next multiple of kPixelsPerWrite.
+        // In the first row, the pixels up to the next multiple of kPixelsPerWrite are already written.
         PICTURA_NO_UNROLL
         for (int x = row == 0 ? kPixelsPerWrite - place.x % kPixelsPerWrite : 0; x < columns; x += kPixelsPerWrite) {
           store(to + row * patch_px + x, min_of(columns - x, kPixelsPerWrite), PixelVector<Value>{});

@@ -79,7 +79,8 @@ __device__ void resolve_occlusion(const Memory& memory, const Part& part, int co
   if (!pairs.is_empty()) resolve_pairs<Memory>(pairs.take(), part);
 }
 
-// Calls divide_remainder() for each pixel that several fragments cover fully, in the thread of the first.
+// Calls divide_remainder() for each pixel with a fragment that covers it fully, in the thread of the first such
+// fragment of the pixel's list.
 template <typename Memory>
 __device__ __noinline__ void divide_remainders(int count) {
   const Memory memory = Memory::current();

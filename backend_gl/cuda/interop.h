@@ -43,7 +43,7 @@ struct HostScene {
 class CudaInterop {
  public:
   virtual ~CudaInterop() = default;
-  /// On the class: No function needs the device to be current.
+  /// No function of this class needs the device to be current.
   virtual Device device() const = 0;
   virtual void synchronize(Stream stream) const = 0;
   /// Registers a buffer object of the current context.

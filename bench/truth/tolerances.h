@@ -22,7 +22,7 @@ constexpr double kDepthError = 1e-3;
 /// Maximum error of the visibility of an agent of 4 pixels or more, as the design requires.
 constexpr double kVisibilityError = 0.02;
 /// Maximum change of a channel when a whole scene is moved. Corners move by about 1e-5 px per 100 m from the origin. A
-/// sample that changes sides of an edge changes two faces by up to 1/64 of a pixel.
+/// sample that moves across an edge changes the coverage of two faces by up to 1/64 of a pixel.
 constexpr double kMovedSceneError = 8.0 / 255;
 /// Maximum share of a moved scene's values that change by more than rounding.
 constexpr double kMovedSceneShare = 1e-3;

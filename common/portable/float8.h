@@ -9,7 +9,8 @@
 
 namespace pictura {
 
-// Two types, because programs may mix code with and without AVX2, and the two kinds of code pass the types differently.
+// Two namespaces, because programs may mix code with and without AVX2, and the two kinds of code pass a Float8 to
+// functions differently.
 #if defined(__AVX2__) && !defined(__CUDACC__)
 inline namespace float8_in_a_register {
 

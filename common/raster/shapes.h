@@ -274,7 +274,7 @@ PICTURA_HD inline void strip_faces(const Strip& strip, const PinholeCamera& came
   emit_quad(strip_quad(strip), camera, floor_px, emit);
 }
 
-/// Strips are on one level if their heights differ by less than this. Their rank then decides which is in front.
+/// Strips are on one level if their heights differ by less than this. strip_rank() then decides which is in front.
 constexpr float kSameLevel_m = 0.05f;
 /// A strip's depth is clamped to the range of its corners' depths, widened by this factor. Close to the strip's plane,
 /// the depth would otherwise vary without bound within a pixel.

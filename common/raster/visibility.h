@@ -255,7 +255,8 @@ PICTURA_HD inline float occluder_bound(const ScreenFace& face, int x, int y) {
 }
 
 /// Whether any part of a face may be in front of the largest occluder bound of pixel (x, y). A strip seen from below
-/// also passes if a solid that stands on it could. CUDA code may first test smaller bounds, in any order.
+/// also passes if a solid that stands on it may be in front of the bound. CUDA code may first test smaller bounds, in
+/// any order.
 PICTURA_HD inline bool passes_occluder_bound(const ScreenFace& face, float bound, int x, int y) {
   const float nearest = center_inverse_depth(face, x, y) + inverse_depth_half_range(face);
   return !(nearest * face.nearest_standing < bound);
@@ -322,8 +323,8 @@ struct OccludedSamples {
   uint64_t of_a = 0, of_b = 0;
 };
 
-/// Samples that two fragments of different primitives hide from each other. a is in front at the shared samples
-/// `a_first`. A sliver occludes nothing and is occluded as a whole. Only full fragments occlude full fragments.
+/// For each of two fragments of different primitives, its samples that the other hides. a is in front at the shared
+/// samples `a_first`. A sliver occludes nothing and is occluded as a whole. Only full fragments occlude full fragments.
 PICTURA_HD inline OccludedSamples occluded_samples(const PixelCoverage& a, const PixelCoverage& b, uint64_t shared,
                                                    uint64_t a_first) {
   if (a.samples == 0 || b.samples == 0) {

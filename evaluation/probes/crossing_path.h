@@ -42,7 +42,7 @@ struct PathPart {
   int begin = 0, first_seen = 0, hidden_again = 0, end = 0;
 };
 /// visible_shares: [kPathPoints] visible shares of the pedestrian, NaN where it cannot stand. Returns an empty value if
-/// the pedestrian is visible at the origin or the conditions above are violated.
+/// the pedestrian is not hidden at the origin, or if kPathHidden_m, kPathSeen_m or kPathWhole is not reached.
 std::optional<PathPart> usable_part(Span<const float> visible_shares);
 
 }  // namespace pictura

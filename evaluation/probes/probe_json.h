@@ -10,8 +10,8 @@ namespace pictura {
 /// Adds the numbers of cases and scenes, and the estimates.
 void add_means(const ResponseMeans& means, Json* json_out);
 
-/// Returns the policies, each with the numbers of scenes that it drove and of their cases. drivers: [cases] driver
-/// indices.
+/// Returns the policies, each with the number of scenes that it drove, and the number of cases in these scenes.
+/// drivers: [cases] driver indices.
 Json policies_json(const ProbeResults& results, const std::vector<int32_t>& drivers);
 
 /// Adds the settings, interruption and duration.

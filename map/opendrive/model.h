@@ -89,7 +89,7 @@ struct GeometryPiece {
 /// A <line> of a mark.
 struct MarkLine {
   double length = 0, space = 0;  // lengths of a dash and of the gap after it
-  double t_offset = 0;           // centre line, to the left of the lane's border
+  double t_offset = 0;           // offset of this line's middle to the left of the lane's border
   double s_offset = 0;           // first dash, from the start of the mark
   double width = 0;              // 0: the mark's width
   std::optional<MarkColor> color;

@@ -13,7 +13,7 @@ namespace pictura::opendrive {
 /// A jump between the end of a geometry and the start of the next geometry.
 struct Jump {
   std::size_t piece = 0;          // index of the next geometry
-  Eigen::Vector2d shift_m{0, 0};  // from that end to that start
+  Eigen::Vector2d shift_m{0, 0};  // from the previous geometry's end to the next geometry's start
 };
 
 /// Whether the jump, spread over the whole road, turns the line by at most 0.2 rad.

@@ -73,7 +73,7 @@ inline opendrive::GeometryPiece arc_to(const Pose& from, const Eigen::Vector2d& 
   return piece_of(from, chord * half_turn / std::sin(half_turn), 2 * std::sin(half_turn) / chord);
 }
 
-/// Returns two arcs with a common tangent, whose end tangents have equal lengths, or a single arc.
+/// Returns a biarc with equal tangent lengths at both ends, or a single arc if the two arcs have equal curvature.
 inline Curve biarc(const Pose& from, const Pose& to) {
   const Eigen::Vector2d leaving = direction_of(from.heading), arriving = direction_of(to.heading);
   const Eigen::Vector2d chord = to.position_m - from.position_m;

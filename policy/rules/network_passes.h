@@ -116,8 +116,8 @@ class NetworkPasses {
   NetworkPasses(const NetworkPasses&) = delete;
   NetworkPasses& operator=(const NetworkPasses&) = delete;
 
-  /// Whether a number of channels is supported: supports_gelu() by bias_gelu(), supports_norm() by norm() and
-  /// bias_norm_gelu().
+  /// supports_gelu(): whether bias_gelu() supports this number of channels; supports_norm(): whether norm() and
+  /// bias_norm_gelu() do.
   static constexpr bool supports_gelu(int64_t channels) { return channels % 8 == 0 && channels <= 1024; }
   static constexpr bool supports_norm(int64_t channels) {
     return channels % 64 == 0 && channels <= 512 && channels != 320 && channels != 448;

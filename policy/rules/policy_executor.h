@@ -6,8 +6,8 @@
 
 namespace pictura {
 
-/// Interface of executors, which compute the same bits on hosts and CUDA devices. Only one thread may use one at a
-/// time. All arrays are on device(). Functions enqueue work on the stream; those that return a number wait.
+/// Interface of executors, which compute the same bits on hosts and CUDA devices. Only one thread at a time may use an
+/// executor. All arrays are on device(). Functions enqueue work on the stream; those that return a number wait.
 class PolicyExecutor {
  public:
   PolicyExecutor() = default;

@@ -13,8 +13,8 @@ class DrivenAgent {
 
   Motion now() const { return motion_of(world_.agents, slot_); }
   Motion after(const Motion& from, int32_t action) const;
-  /// Returns the best action without lateral jerk for reaching a speed. For the k-th lateral jerk (actions.h), add k -
-  /// kStraight to the action.
+  /// Returns the best action without lateral jerk for reaching a speed. For the lateral jerk of index k (0 to 2,
+  /// actions.h), add k - kStraight to the action.
   int32_t speed_action(const Motion& from, float wanted_mps) const;
   static constexpr int32_t kStraight = 1;
 

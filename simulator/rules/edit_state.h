@@ -87,8 +87,8 @@ PICTURA_HD inline bool has_slot(const StateEdit& edit, int i, int num_slots) {
   return edit.slots[i] >= 0 && edit.slots[i] < num_slots;
 }
 
-/// Returns the error of element i, or kNoEditFault. first_element [slots]: first element for each slot. world_of(slot)
-/// must return the slot's WorldView.
+/// Returns the error of element i, or kNoEditFault. first_element [slots]: the first element of the edit that names
+/// each slot. world_of(slot) must return the slot's WorldView.
 template <typename WorldOf>
 PICTURA_HD int64_t find_edit_fault(const StateEdit& edit, int i, int num_slots, const int32_t* first_element,
                                    const WorldOf& world_of) {

@@ -114,7 +114,7 @@ PICTURA_HD inline int max_steps_of(const WorldView& world) {
   return kMinSteps + random.below(episode_steps - kMinSteps + 1);
 }
 
-/// Whether an episode ends after `steps` steps with `active` of `spawned` agents.
+/// Whether an episode ends after `steps` steps if `active` of its `spawned` agents count as active.
 PICTURA_HD inline bool episode_ends(const WorldView& world, int steps, int spawned, int active) {
   if (steps >= max_steps_of(world) || spawned == 0) return true;
   const float inactive = static_cast<float>(spawned - active);

@@ -15,8 +15,8 @@ constexpr float kWaypointLevel_m = 4.0f;
 /// Radius of the metric Goals, which counts last waypoints of chains (paper, metric definitions).
 constexpr float kMetricGoalRadius_m = 2.0f;
 
-/// Returns the point on the neighbouring lane (`side` < 0: left) at the same fraction of its length, or `at` without
-/// such a lane.
+/// Returns the point on the neighbouring lane (`side` < 0: left) at the same fraction of its length, or `at` if there
+/// is no such lane.
 PICTURA_HD inline RoutePoint neighbor_of(const MapView& map, RoutePoint at, int side) {
   const MapLane& lane = map.lanes[at.lane];
   const int32_t neighbor = side < 0 ? lane.left : lane.right;

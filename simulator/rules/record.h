@@ -58,8 +58,8 @@ PICTURA_HD inline void leave(const WorldView& world, int agent) {
 }
 
 /// Places an agent at its recorded state `step` steps after the episode's start, or removes it if there is no such
-/// state. An agent that did not follow its record before is not tested for collisions on the way. Only the first thread
-/// of the group writes.
+/// state. If the agent did not follow its record in the step before, the way to the recorded state is not tested for
+/// collisions. Only the first thread of the group writes.
 template <typename ThreadGroup>
 PICTURA_HD void follow_record(const WorldView& world, int agent, int step, const ThreadGroup& group) {
   const AgentStateView& agents = world.agents;

@@ -27,7 +27,8 @@ PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light,
                                             float dt_s, uint64_t seed, uint32_t world, uint32_t episode) {
   constexpr float kOffFraction = 0.2f, kAlwaysGreenFraction = 0.05f;
   constexpr uint32_t kEpisodeKey = 0, kJunctionKey = 1, kLightKey = 2, kLoneLightKey = 3;
-  // `agent` is the kind of the key (episode, junction or light), and `step` is the index of the junction or light.
+  // In the random keys below, `agent` is the key's kind (episode, junction or light) and `step` is the index of the
+  // junction or light.
   const bool is_independent = cycles == LightCycles::independent;
   const bool is_alone = is_independent || line.junction < 0;
   const uint32_t group = static_cast<uint32_t>(is_alone ? light : line.junction);

@@ -50,8 +50,8 @@ PICTURA_HD inline bool ends_way(const WorldView& world, int agent) {
          is_at_route_end(world.map, {world.agents.goal_lane[slot], world.agents.goal_lane_s_m[slot]});
 }
 
-/// Returns the event bits of waypoints that the motion passes. The goal of the metric Goals is a chain's last waypoint,
-/// as soon as it is the agent's next waypoint. It remains the goal until the agent passes it within
+/// Returns the event bits of waypoints that the motion passes. A chain's last waypoint becomes the goal of the metric
+/// Goals when it becomes the agent's next waypoint. It remains the goal until the agent passes it within
 /// kMetricGoalRadius_m, or until the next chain's last waypoint replaces it. The reward may accept a larger distance,
 /// so an agent can pass the waypoint for the reward first and for the metric later.
 template <typename ThreadGroup>

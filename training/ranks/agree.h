@@ -8,7 +8,8 @@
 
 namespace pictura {
 
-/// Throws Error on every rank, naming the key, if two ranks' settings differ. manner: further settings as text.
+/// Throws Error on every rank, naming the key, if two ranks' settings differ. manner: other settings that must be
+/// equal, as text.
 void check_equal_settings(const Config& config, const std::string& manner, Ranks* ranks);
 
 /// Whether `is_so` is true on any rank.

@@ -25,7 +25,8 @@ struct GaeTail {
 
 /// Returns the advantage of a step's decision; 0 without a decision. Call it for a slot's steps from the last to the
 /// first. Each step discounts by gamma, each decision by gae_lambda. So the return of an action held for k steps is the
-/// sum of gamma^i r_i, bootstrapped with gamma^k. tail_inout: tail after this step; on return, after the previous step.
+/// sum of gamma^i r_i, bootstrapped with gamma^k. tail_inout: tail of the later steps; on return, it includes this
+/// step.
 PICTURA_HD inline float gae_advantage(const GaeTransition& transition, float gamma, float gae_lambda,
                                       GaeTail* tail_inout) {
   const bool goes_on = !transition.is_terminated && !transition.is_truncated;

@@ -31,7 +31,7 @@ struct RowFrame {
 };
 
 #ifdef offsetof  // undefined under NVRTC
-// Read as eight consecutive floats.
+// load8() reads eight consecutive floats of these types.
 static_assert(offsetof(AgentBox, cos_heading) == 3 * sizeof(float) &&
               offsetof(AgentBox, height_m) == 7 * sizeof(float));
 static_assert(offsetof(StopLine, right_m) == 3 * sizeof(float) && sizeof(StopLine) >= 8 * sizeof(float));
