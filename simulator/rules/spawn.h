@@ -29,7 +29,7 @@ PICTURA_HD inline RandomStream agent_stream(const WorldView& world, int agent, u
 }
 
 /// Random stream of a goal chain. The key is the life's first step plus the chain's index; keys of different lives
-/// differ, because a life of n steps draws fewer than n chains.
+/// differ, because a life of n steps draws at most n chains.
 PICTURA_HD inline RandomStream goal_stream(const WorldView& world, int agent, int32_t chain) {
   const int32_t life_step = world.agents.life_step[world.first_slot + agent];
   return agent_stream(world, agent, static_cast<uint32_t>(life_step) + static_cast<uint32_t>(chain), Purpose::goals);
