@@ -42,7 +42,7 @@ enum class Purpose : uint8_t {
   parameters,
   town,
   soak,
-  first_episode,
+  episode_length,
   map_copies,
   entry,
   removal_case,

@@ -37,7 +37,7 @@ struct SimulatorConfig {
   float dt_s = 0.1f;    // in [0.01, 0.1]
   int episode_steps = 1280;
   float reset_inactive_fraction = 0.4f;  // inactive share at which a world resets; > 1: never
-  bool stagger_episodes = false;         // random lengths of first episodes; see max_steps_of()
+  bool stagger_episodes = false;         // random lengths of episodes; see max_steps_of()
   AfterInfraction after_infraction = AfterInfraction::halt;
   bool leave_at_goal = false;                                 // agents leave after they pass a goal within 2 m
   float pedestrian_fraction = 0.1f, cyclist_fraction = 0.1f;  // all others are vehicles

@@ -897,7 +897,7 @@ class Simulator:
                 agents are drawn at random in each episode; their transitions are never valid.
             phantom_braking: Share of agents that brake hard for some seconds without a reason.
             inattentive: Share of agents that see no traffic lights.
-            stagger_episodes: Whether the first episode of each world ends after a random number of steps.
+            stagger_episodes: Whether episodes end after a random number of steps, so that worlds do not end together.
             fixed_lights: Whether lights are green, yellow and red for 10, 3 and 2 s, as in evaluations. Otherwise durations are
                 random in each episode.
             auxiliary_observations: Whether auxiliary numbers, which no image shows, are observed.

@@ -104,14 +104,17 @@ PICTURA_HD inline void count_agent(const WorldView& world, int agent, const Step
   count_events(world.agents.events[slot], totals_inout);
 }
 
-/// Maximum number of steps of the current episode. With stagger_episodes, the first episode has U{64, ...,
-/// episode_steps} steps, so that worlds do not end episodes together.
+/// Maximum number of steps of the current episode, T = episode_steps. With stagger_episodes, it is drawn, so that
+/// worlds do not end episodes together: U{64, ..., T} for the first episode. Later ones have U{T - floor(T / 8), ...,
+/// T}, because worlds that ended together would otherwise do so again after T steps.
 PICTURA_HD inline int max_steps_of(const WorldView& world) {
   constexpr int kMinSteps = 64;
   const int episode_steps = world.options.episode_steps;
-  if (!world.options.stagger_episodes || world.episode > 0 || episode_steps <= kMinSteps) return episode_steps;
-  RandomStream random({.seed = world.seed, .world = world.global_world, .purpose = Purpose::first_episode});
-  return kMinSteps + random.below(episode_steps - kMinSteps + 1);
+  if (!world.options.stagger_episodes || episode_steps <= kMinSteps) return episode_steps;
+  RandomStream random(
+      {.seed = world.seed, .world = world.global_world, .episode = world.episode, .purpose = Purpose::episode_length});
+  const int fewest = world.episode == 0 ? kMinSteps : episode_steps - episode_steps / 8;
+  return fewest + random.below(episode_steps - fewest + 1);
 }
 
 /// Whether an episode ends after `steps` steps if `active` of its `spawned` agents count as active.
