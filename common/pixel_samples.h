@@ -10,7 +10,7 @@
 namespace pictura {
 
 /// Accepted texts, for messages.
-constexpr const char* kPixelSamplesExpected = "1 to 64 samples like 4, or a square grid of them like 4x4";
+constexpr const char* kPixelSamplesExpected = "1 to 64 samples, such as 4, or a square grid, such as 4x4";
 
 /// Parses "4" (MSAA) or "4x4" (supersampling), up to 64 samples. Returns nothing for other texts.
 std::optional<PixelSamples> parse_pixel_samples(std::string_view text);

@@ -37,9 +37,10 @@ Text text_of(RepairKind kind) {
     case RepairKind::moved_geometry:
       return {"geometries whose s is far from the end of the one before", "their s becomes that end"};
     case RepairKind::geometry_jump:
-      return {"jumps of the reference line", "spread over ten metres, or ten times their size"};
+      return {"jumps of the reference line", "spread over ten metres, or ten times their size if more"};
     case RepairKind::geometry_gap: return {"gaps between geometries", "bridged by a straight line"};
-    case RepairKind::height_jump: return {"jumps of the elevation", "spread over ten metres, or ten times their size"};
+    case RepairKind::height_jump:
+      return {"jumps of the elevation", "spread over ten metres, or ten times their size if more"};
     case RepairKind::strip_surface: return {"cross-sections of strips", "flattened"};
     case RepairKind::missing_lane_type:
       return {"lanes without a type", "center lanes get type none, others are special lanes"};
@@ -65,29 +66,28 @@ Text text_of(RepairKind kind) {
     case RepairKind::missing_lane: return {"links to lanes that do not exist", "left out"};
     case RepairKind::missing_contact: return {"links without a contact point", "the nearest end counts"};
     case RepairKind::wrong_end: return {"links to the wrong end of a road", "the end that touches counts"};
-    case RepairKind::one_sided_link: return {"links of roads that are not returned", "made mutual"};
+    case RepairKind::one_sided_link: return {"one-sided links of roads", "made mutual"};
     case RepairKind::unreturned_link:
-      return {"links to a road's end that is itself linked to a third road", "kept, because the ends touch"};
+      return {"links to a road end that links to a third road", "kept, because the ends touch"};
     case RepairKind::contrary_link:
       return {"links to a road's end that is linked elsewhere and does not touch", "left out"};
-    case RepairKind::dangling_link:
-      return {"links of lanes at an end of their road that is linked to nothing", "left out"};
+    case RepairKind::dangling_link: return {"links of lanes at a road end without a road link", "left out"};
     case RepairKind::unlike_link: return {"links of lanes of unlike types", "left out"};
     case RepairKind::opposed_link: return {"links of lanes of opposite traffic", "left out"};
     case RepairKind::distant_link: return {"links of lanes that do not touch", "left out"};
     case RepairKind::missing_junction: return {"references to junctions that do not exist", "left out"};
     case RepairKind::unconnected_road: return {"connections of roads that do not meet the junction", "left out"};
-    case RepairKind::repeated_signal: return {"signal ids used twice", "all stand; references mean the first"};
+    case RepairKind::repeated_signal: return {"signal ids used twice", "all are kept; references mean the first"};
     case RepairKind::missing_signal: return {"references to signals that do not exist", "left out"};
     case RepairKind::repeated_controller: return {"controller ids used twice", "the first counts"};
     case RepairKind::missing_controller: return {"references to controllers that do not exist", "left out"};
     case RepairKind::uncontrolled_light:
       return {"lights without a controller",
               "at junctions, similar headings share a phase; elsewhere each light cycles alone"};
-    case RepairKind::unlisted_light: return {"lights that the controllers of their junction leave out", "left out"};
+    case RepairKind::unlisted_light: return {"lights that no controller of their junction lists", "left out"};
     case RepairKind::laneless_light: return {"lights without a lane", "left out"};
     case RepairKind::missing_link:
-      return {"lanes that end without a link where others begin", "routes end with the lane that lacks a link"};
+      return {"missing links between lanes that touch", "routes end with the lane that lacks a link"};
     case RepairKind::repeated_element: return {"element ids used twice", "the first counts"};
     case RepairKind::missing_element: return {"references to elements that do not exist", "left out"};
     case RepairKind::missing_position: return {"points without a position", "left out"};
