@@ -25,8 +25,8 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments);
 /// Throws UsageError for options of towns with --protocol, and options of scenes without it.
 void reject_idle_scene_options(const CLI::App& command, const SceneArguments& arguments);
 
-/// Prints a table, or one JSON object if `json`. `densities`: shares of road users that remain, in %; used only with
-/// --density, else the protocol's shares apply. `out`: file for later merging, or empty. After an interrupt, prints the
+/// Prints a table, or one JSON object if `json`. `densities`: shares of road users to keep, in %. Without --density,
+/// the protocol's shares apply instead. `out`: file for later merging, or empty. After an interrupt, prints the
 /// completed results and throws Interrupted.
 void run_scene_evaluation(const CLI::App& command, const SceneArguments& arguments, int steps,
                           const std::vector<std::string>& densities, SceneEvaluateOptions options,

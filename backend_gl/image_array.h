@@ -1,4 +1,5 @@
-// Images of one size as layers of an array texture with all samples. A pass averages the samples into planar images.
+// An array texture that stores all samples of images of one size, one image a layer. A pass averages the samples into
+// planar images.
 #pragma once
 
 #include <initializer_list>

@@ -8,7 +8,7 @@
 
 namespace pictura::gl {
 
-/// Bounds on the depth of a strip's corner divided by the depth of FaceInstance::compared_plane at the same screen
+/// Bounds on the ratio of the depth of a strip's corner to that of FaceInstance::compared_plane at the same screen
 /// point. Beyond the plane's horizon, the minimum applies. The maximum is that of the CPU renderer.
 constexpr float kMinInverseDepth = 1e-4f, kMaxInverseDepth = kWidenedDepth;
 

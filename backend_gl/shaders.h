@@ -16,7 +16,7 @@ layout(location = 4) in vec3 compared_plane;
 layout(location = 5) in vec3 color;
 layout(location = 6) in int layer;
 uniform vec4 projection;  // scale of x and y, offset of x and y
-uniform vec2 positions;   // number of corner positions that the driver distinguishes in half an image's width and height
+uniform vec2 positions;   // corner positions that the driver distinguishes along half an image's width and height
 uniform vec2 inverse_depth;    // bounds on the ratio of a corner's depth to that of compared_plane (see FaceInstance)
 uniform float near_m;
 flat out vec3 face_color;

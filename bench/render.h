@@ -29,7 +29,8 @@ struct RenderMeasurement {
   std::string choice;           // as reported by make_renderer()
   std::vector<double> call_ms;  // [repeat] mean time of a call
   ImageError error;             // checked views against the oracle
-  // If measures_memory: device memory after the upload of the maps, and its peak. Excludes scene, views and images.
+  // If measures_memory: device memory after the upload of the maps, and its peak. Excludes scene, views and images;
+  // image_bytes is the size of the colour images.
   double up_front_bytes = 0, max_bytes = 0, image_bytes = 0;
 };
 

@@ -23,8 +23,8 @@ struct EpisodeValues {
   std::vector<double> values;
 };
 
-/// Counts spawned agents by class, agents without a place by reason, unreachable waypoints, and the events of a random
-/// policy in whole episodes. These counts use default options and the light timing of training. Measures the
+/// Counts spawned agents (by class), agents without a place (by reason), unreachable waypoints, and the events of a
+/// random policy in whole episodes. These counts use default options and the light timing of training. Measures the
 /// lane-keeping controller with the light timing of evaluations, up to the maximum length of an episode.
 std::vector<EpisodeValues> measure_worlds(const std::shared_ptr<const RoadMap>& map,
                                           const WorldStatisticsOptions& options);

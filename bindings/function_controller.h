@@ -19,11 +19,11 @@ namespace py = pybind11;
 std::string name_of_function(const py::function& function);
 
 /// Returns a function that makes controllers, which call function(observations) with a dict of NumPy arrays [agents,
-/// ...]. `function` returns actions, int [agents], or logits [agents, kNumActions] and values [agents]. argmax and seed
-/// choose actions from logits. A renderer adds images: `rgb`, u8 [agents, cameras, 3, height, width], black for
-/// inactive agents; `rgb_0`, `rgb_1`, ... for several sizes. The returned function throws Error unless the simulator is
-/// on the host; controllers throw UsageError for invalid results of `function`, and pass on the exceptions that it
-/// throws.
+/// ...]. `function` returns actions, int [agents], or logits [agents, kNumActions] and values [agents].
+/// DriverOptions::argmax and DriverOptions::seed determine the choice of actions from logits. A renderer adds images:
+/// `rgb`, u8 [agents, cameras, 3, height, width], black for inactive agents; `rgb_0`, `rgb_1`, ... for several sizes.
+/// The returned function throws Error unless the simulator is on the host; controllers throw UsageError for invalid
+/// results of `function`, and pass on the exceptions that it throws.
 std::function<std::unique_ptr<Controller>(const DriverOptions&, const Simulator&, Renderer*)> function_controllers(
     const py::function& function);
 

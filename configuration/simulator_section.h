@@ -22,7 +22,7 @@ std::optional<NamedShare> parse_share(const std::string& text);
 struct SceneSection {
   // Name of a SceneProtocol.
   std::string protocol = "gpudrive";
-  std::string control;             // road users that the policy drives; empty: by the protocol
+  std::string control;             // road users that the policy drives; empty: the protocol's
   std::vector<std::string> rules;  // "NAME=VALUE", see set_scene_rule()
   int max_replayed = 96;           // maximum number, per world, of road users that follow the recording
   int64_t updates_per_set = 8;     // updates after which the worlds change to the next scenes

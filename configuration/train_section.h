@@ -57,7 +57,7 @@ struct TrainSection {
   double adv_filter_ema = 0.25;        // weight of the newest rollout in the running value
   int64_t checkpoint_every = 20;       // in updates
   double checkpoint_minutes = 2;       // maximum time between checkpoints
-  int64_t keep_checkpoints = 1;        // number: the newest, and earlier ones as checkpoint.1.ckpt, ...
+  int64_t keep_checkpoints = 1;        // kept checkpoints; earlier ones are checkpoint.1.ckpt, ...
   int64_t milestone_agent_steps = 0;   // interval of checkpoints that are never deleted; 0: none
   // See training/run_evaluation.h.
   int64_t evaluate_every = 0;  // in updates; 0: never

@@ -25,8 +25,8 @@ struct RecordedScenario {
   std::string world_of;
 };
 
-/// After `step` steps of a scenario, a policy drives `agent` for `steps` steps, while all other agents repeat their
-/// motion. The steps before the takeover use the world configuration of RecordedScenario::world_of.
+/// After `step` steps of a scenario, a policy drives `agent` for `steps` steps. All other agents move as they did
+/// without the takeover. The steps before the takeover use the world configuration of RecordedScenario::world_of.
 struct RecordedTakeover {
   std::string policy;
   bool untrained = false;  // new random weights

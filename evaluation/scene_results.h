@@ -44,7 +44,7 @@ struct SceneCounts {
 struct SceneResults {
   EvaluationSetting setting;  // `maps` holds SceneEvaluateOptions::scenes
   SceneProtocol protocol;
-  // Why files, or the rest of a file, cannot be read; includes files outside the range of scenes.
+  // Reasons why files, or files from some record on, cannot be read; also for files outside the range of scenes.
   std::vector<std::string> unread;
   int first_scene = 0, num_scenes = 0;
   int without_drivers = 0;                       // excluded: all road users are parked or absent

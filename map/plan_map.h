@@ -1,4 +1,4 @@
-// The plan of an affine copy of a map: a linear transformation of the ground plane.
+// The linear transformation of the ground plane that makes an affine copy of a map.
 #pragma once
 
 namespace pictura {

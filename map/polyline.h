@@ -57,7 +57,7 @@ inline double chord_error(const CurvePoint& a, const CurvePoint& b, const CurveP
 }
 
 /// Returns the indices of the points to keep, including both ends. Omitted points are within `tolerance_m` of their
-/// chord. Chords exceed `max_piece_m` in plan only between neighbouring points.
+/// chord. Only chords between neighbouring points may be longer than `max_piece_m` in plan.
 std::vector<std::size_t> thin_polyline(const std::vector<CurvePoint>& points, double tolerance_m, double max_piece_m);
 
 /// Limit on the number of samples. count_sample() throws Error beyond the limit, and Interrupted if `work` is

@@ -1,4 +1,4 @@
-// Repairs of faults in map files. A repaired fault has only one sensible meaning.
+// Repairs of faults in map files. Only faults with a single sensible repair are repaired.
 #pragma once
 
 #include <cstdint>

@@ -54,7 +54,7 @@ struct LanePoint {
 struct Lane {
   LaneType type = LaneType::other;
   bool in_junction = false;
-  bool is_endless = false;  // an unbounded route starts here
+  bool is_endless = false;  // a route from here can continue without end
   int32_t junction = -1;
   IndexRange points;                                // in RoadMap::lane_points, at least two
   IndexRange successors, predecessors;              // in RoadMap::lane_links, which holds lane indices

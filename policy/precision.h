@@ -12,7 +12,7 @@ namespace pictura {
 void set_float32_products(Precision precision);
 
 /// Sets for the whole process whether torch, cuDNN and cuBLAS compute the same bits in every run. Call it before the
-/// first product on a device, because torch then reads CUBLAS_WORKSPACE_CONFIG. If `reproducible`, throws Error if this
+/// first product on a device, during which torch reads CUBLAS_WORKSPACE_CONFIG. If `reproducible`, throws Error if this
 /// variable has a value with which cuBLAS is not reproducible.
 void set_reproducible(bool reproducible);
 

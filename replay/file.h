@@ -10,7 +10,8 @@
 
 namespace pictura {
 
-/// Maximum bytes of compressed images in a page. The page itself draws later frames.
+/// Maximum bytes of compressed images in a page. Frames beyond this limit have no stored images; the page draws them in
+/// the browser.
 constexpr size_t kMaxWrittenImageBytes = 7'500'000;
 
 /// Writes the complete page or nothing. Throws Error naming the path.

@@ -36,7 +36,7 @@ class LiveWorld final : public StepObserver {
   int64_t step() const { return step_; }
 
  private:
-  /// Keeps only the newest frame. `num_episodes`: episodes before that frame was added.
+  /// Keeps only the newest frame. `num_episodes`: the number of episodes before the frame was added.
   void keep_newest(size_t num_episodes);
 
   Recorder recorder_;

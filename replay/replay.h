@@ -174,7 +174,7 @@ struct ReplayImages {
 struct ReplayOrigin {
   std::string command, commit, version;
   std::string map, map_hash;
-  // in the map file's coordinates; zero in files without it
+  // in the map file's coordinates; zero if the replay's file lacks this value
   std::array<double, 3> map_origin_m{};
   std::string policy, policy_hash;
   std::string light_cycles;  // light_cycles_text(); empty in files without this value

@@ -11,8 +11,8 @@ struct ObservationQuery {
   int32_t slot = 0;
   int32_t hidden_begin = 0, hidden_end = 0;      // range of ObservationQueries::hidden
   int32_t inserted_begin = 0, inserted_end = 0;  // range of ObservationQueries::inserted
-  /// 0: hidden boxes get no row among the partners (observed road users); farther boxes move up. 1: these rows are
-  /// zeros.
+  /// 0: hidden boxes get no row among the partners (observed road users); farther boxes move up. 1: the rows of hidden
+  /// boxes are zeros.
   int32_t leaves_gaps = 0;
 };
 

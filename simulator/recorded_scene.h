@@ -24,9 +24,9 @@ std::shared_ptr<const CompiledMap> compile_scenario(std::shared_ptr<const Scenar
                                                     const MapOptions& options = {}, int32_t start_step = 0);
 
 /// Map of a scene for worlds of at most num_agents agents. The first agents are the tracks in `driven`; further agents
-/// are never present. The tracks in `replayed` follow their records, and take the boxes of the first parked cars. An
-/// agent whose track is absent at the start takes no part in the episode. Throws UsageError unless 1 <= driven.size()
-/// <= num_agents.
+/// are never present. The tracks in `replayed` follow their records; their boxes replace those of the first parked
+/// cars. An agent whose track is absent at the start takes no part in the episode. Throws UsageError unless 1 <=
+/// driven.size() <= num_agents.
 std::shared_ptr<const CompiledMap> with_tracks(const CompiledMap& map, Span<const int32_t> driven,
                                                Span<const int32_t> replayed, int num_agents);
 

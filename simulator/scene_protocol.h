@@ -27,7 +27,7 @@ struct SceneProtocol {
   std::vector<double> densities{1.0, 0.75, 0.5};  // remaining shares of a scene's road users
   int rollouts = 1;                               // drives per scene, each with its own random draws
   float box_scale = 1;                            // factor on length and width of boxes
-  // A road user nearer to its goal at the start follows the recording.
+  // A road user within this distance of its goal at the start follows the recording; 0: none does.
   float min_distance_to_goal_m = 2;
   // Maximum turn between the first two recorded states; 0: any. After a larger turn, a road user starts with the second
   // heading, because the first contradicts its motion.

@@ -27,9 +27,9 @@ class SceneRecorder final : public StepObserver {
 
   /// Returns the scene so far. Each box that was present at any step has a track, whose id is its index in the world.
   /// On open maps, each life has a track: life k of box b (counted from 0) has the id b + k * (number of boxes).
-  /// self_agent is the self-driving car; -1: none. Worlds of recorded scenes keep ids, types, lights and the
-  /// self-driving car. An empty `id` becomes map name, seed, world and episode. Throws UsageError if self_agent was
-  /// never present.
+  /// self_agent is the self-driving car; -1: none. In a world of a recorded scene, ids, types and lights are those of
+  /// that scene; with self_agent -1, so is the self-driving car. An empty `id` becomes map name, seed, world and
+  /// episode. Throws UsageError if self_agent was never present.
   Scenario scenario(std::string id = "", int self_agent = -1) const;
 
  private:

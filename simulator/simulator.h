@@ -171,9 +171,9 @@ class Simulator {
   uint64_t generation() const { return generation_; }
 
   /// Replaces the worlds and maps, and starts the first episodes of `seed`, bit for bit as a new simulator would.
-  /// handles: [maps]; empty means 0, 1, and so on. On a device, allocates nothing if the capacity suffices, and does
-  /// not copy present maps again. Captured graphs and controllers of the previous worlds become invalid. May wait for
-  /// the stream. Throws as make_simulator() does, leaving everything unchanged.
+  /// handles: [maps]; empty means 0, 1, and so on. On a device, allocates nothing if the capacity suffices, and copies
+  /// only missing maps while there is memory for old and new maps. Captured graphs and controllers of the previous
+  /// worlds become invalid. May wait for the stream. Throws as make_simulator() does, leaving everything unchanged.
   virtual void set_worlds(CompiledMaps maps, std::vector<GeometryHandle> handles, std::vector<WorldSpec> worlds,
                           uint64_t seed, Stream stream = {}) = 0;
   /// Allocates for later set_worlds() calls and preserves the state. May wait for the device.

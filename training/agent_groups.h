@@ -22,8 +22,8 @@ struct AgentGroups {
   AgentGroup rest, moving;
 };
 
-/// Groups the valid transitions with new decisions of all ranks' rollouts, whose advantages must have been computed.
-/// The filter keeps transitions with |advantage| >= adv_threshold. Values of an empty group are NaN.
+/// Groups the transitions of all ranks' rollouts that are valid and have new decisions. Advantages must have been
+/// computed. The filter keeps transitions with |advantage| >= adv_threshold. Values of an empty group are NaN.
 AgentGroups group_agents(const Rollout& rollout, double adv_threshold,
                          Communicator* communicator = single_communicator());
 

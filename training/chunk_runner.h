@@ -42,7 +42,7 @@ class ChunkRunner {
   /// Phase::forward.
   Policy::Output act(const at::Tensor& rows);
 
-  /// Returns act()'s output as updates compute it; the network runs without CUDA graphs. Counts as Phase::learn.
+  /// Like act(), but runs the network without CUDA graphs. Counts as Phase::learn.
   Policy::Output forward_no_grad(const at::Tensor& rows);
 
   void set_targets(const Targets& targets);

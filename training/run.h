@@ -77,7 +77,7 @@ struct Run {
   int64_t agent_steps = 0;  // steps of active agents in completed updates
   double distance_m = 0;    // total of all agents in completed updates
   // Longest wall times in s. Keys are like "NVIDIA H100 80GB HBM3, 20480 agents"; for evaluations they end in ",
-  // evaluation". An update's entry covers only the last process that completed an update with its key.
+  // evaluation". An entry for updates holds the longest of the last process that completed an update with this key.
   std::map<std::string, double> longest_update_s;
 
  private:

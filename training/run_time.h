@@ -21,7 +21,7 @@ class RunTime {
   /// Collective: every rank must call it.
   bool would_exceed_limit(RunWork work) const;
   void add(RunWork work, double seconds);
-  /// Multiplies expected durations by `times`. The next update's duration then replaces that of the longest update.
+  /// Multiplies expected durations by `times`. The next update then counts as the longest, even if it is shorter.
   void scale_expected_duration(double times);
   /// Limits progress->eta_s to the remaining time.
   void limit_eta(TrainProgress* progress) const;

@@ -13,8 +13,9 @@ double learning_rate_at(const TrainSection& config, int64_t agent_steps);
 /// Whether the learning rate has fallen to 0, which ends the run.
 bool schedule_has_ended(const TrainSection& config, int64_t agent_steps);
 
-/// Factor for logits after an update of this number of agent-steps: logits double every sharpen_agent_steps. Larger
-/// logits make a hesitant agent wait even longer in training. Waiting costs return, so the policy learns to start.
+/// Factor for logits after an update of this number of agent-steps: logits double every sharpen_agent_steps. In
+/// training, larger logits make an agent that rarely chooses to start wait even longer. Waiting costs return, so the
+/// policy learns to start.
 double logit_growth(const TrainSection& config, int64_t agent_steps);
 
 /// Weight of the teacher's KL divergence in an update that starts after `agent_steps`. It falls linearly from

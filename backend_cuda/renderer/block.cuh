@@ -173,8 +173,9 @@ __device__ inline void warp_expand(WarpState* warp, int count, int end, Visit&& 
   }
 }
 
-// Returns the number of passes over a list, summed over all warps. In each pass, a lane takes entry lane * passes +
-// pass: neighbouring entries, which tend to be equally expensive, are in different passes.
+// Returns the number of passes that process a list. Each pass is made by one warp, with at most one entry per lane. In
+// each pass, a lane takes entry lane * passes + pass: neighbouring entries, which tend to be equally expensive, are in
+// different passes.
 template <int kThreads>
 __device__ inline int passes_of(int count) {
   const unsigned rounds = static_cast<unsigned>(count + kThreads - 1) / kThreads;

@@ -256,8 +256,9 @@ __device__ bool any_fragment(const Memory& memory, typename Memory::Word at, Wan
 }
 
 // Makes all effective_samples() of each fragment visible. If a fragment covers its pixel fully, the pixel's full face
-// becomes a fragment too, because the two may intersect. Lists the pixels whose fragments are not alone. Sets
-// state->divides if several fragments cover a pixel fully, and another covers it partly and is no sliver.
+// becomes a fragment too, because the two may intersect. Lists the pixels with several fragments, or with a fragment
+// and a full face. Sets state->divides if several fragments cover a pixel fully, and another covers it partly and is no
+// sliver.
 template <typename Memory>
 __device__ void finish_fragments(const Memory& memory, int count) {
   using Index = typename Memory::Index;

@@ -128,7 +128,7 @@ struct ImageWriter {
       store_each(image + static_cast<int64_t>(place.y) * width_px + place.x, plane, place.count);
       return;
     }
-    // Neighbours lie in one patch (plan_next_part), and words beyond a part are black.
+    // The pixels of one write lie in one patch (see plan_next_part), and words beyond a part are black.
     static_assert(kDefaultPatch_px % kPixelsPerWrite == 0);
     const bool is_right = place.x + place.count == width_px;
     store_each(image + place_in_patch(place), patch_px * patch_px,

@@ -6,7 +6,7 @@
 
 #ifndef PICTURA_RIG_CAMERAS
 #define PICTURA_RIG_CAMERAS 0
-#define PICTURA_RIG_WIDTH_PX 0  // not 0 only if all cameras have the same size
+#define PICTURA_RIG_WIDTH_PX 0  // 0 unless all cameras have the same size
 #define PICTURA_RIG_HEIGHT_PX 0
 #define PICTURA_RANDOMIZES_CAMERAS 1
 #endif

@@ -7,7 +7,7 @@
 
 namespace pictura::cuda {
 
-/// Threads that share an agent: about the number of segments, barriers and boxes to test.
+/// Threads that share an agent, about as many as it has segments, barriers and boxes to test.
 constexpr int kThreadsPerAgent = 8, kWarp = 32;
 
 /// A world's memory for spawning. A try is a candidate place of a box.

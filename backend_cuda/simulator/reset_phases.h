@@ -33,7 +33,7 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
   int32_t* chosen_try = scratch.chosen_try + first_box;
   int32_t* next_try = scratch.next_try + first_box;
   int32_t& lowest_changed = team.memory().lowest_changed;
-  // At first, two tries of each box are evaluated together, or more for few boxes.
+  // At first, two tries of each box are evaluated together, or more if there are few boxes.
   const int first_tries = clamp(kTurn / max_of(count, 1), 2, kSpawnTries);
   team.for_each(count, [&](int i) {
     boxes[i].drawn = 0;

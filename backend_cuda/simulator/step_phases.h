@@ -46,7 +46,7 @@ struct Advance {
   }
 };
 
-/// Moves the box of a replayed track. `index`: number of the box among those of all worlds that belong to no agent.
+/// Moves the box of a replayed track. `index` counts the boxes that belong to no agent, world by world.
 struct ReplayTracks {
   PhaseArrays arrays;
   template <typename ThreadGroup>

@@ -1,4 +1,4 @@
-// Dependencies between streams, and their numbers in DLPack (a standard for exchanging tensors).
+// Dependencies between streams, and numbers of streams in DLPack (a standard for exchanging tensors).
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace pictura {
 
-/// DLPack numbers are 1 (legacy default stream), 2 (per-thread default stream), and handles.
+/// A DLPack number is 1 (legacy default stream), 2 (per-thread default stream) or a stream's handle.
 inline Stream stream_of_number(int64_t number) {
   if (number == 1) return {cudaStreamLegacy};
   if (number == 2) return {cudaStreamPerThread};

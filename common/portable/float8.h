@@ -109,7 +109,7 @@ inline void gather_pairs(const float* from, const int32_t* indices, Float8* firs
   first_out->value = _mm256_shuffle_ps(low, high, 0x88);
   second_out->value = _mm256_shuffle_ps(low, high, 0xDD);
 }
-/// For each element k, loads four unaligned floats at from(k). Float j goes to four_out[j].
+/// For each element k, loads four unaligned floats at from(k). Float j becomes element k of four_out[j].
 template <typename From>
 inline void gather_fours(From&& from, Float8* four_out) {
   // One register holds the four floats of element k (lower half) and of element k + 4.

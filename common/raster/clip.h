@@ -7,7 +7,8 @@
 
 namespace pictura {
 
-/// Each of the five planes adds at most one corner. A step of clip_face() can write one more.
+/// Each of the five planes adds at most one corner. The sixth place is spare, because clip_face() reserves two places
+/// for each side.
 constexpr int kMaxPolygonCorners = kMaxFaceCorners + 6;
 
 /// A plane of the frustum: the near plane or one of four sides. inside() is negative outside. Its unit depends on the

@@ -68,8 +68,8 @@ PICTURA_HD inline SampleRange whole_range() {
 /// (edges.h).
 constexpr float kToLowestBits = 1 << 8;  // the lowest bit is 1 / (kLines_rows * kRowUnits)
 /// For each column, an edge's height minus its height in the first column right of the pixel's centre, minus 2^14.
-/// narrow() adds the height in that column. In the added height, 2^14 stands for the pixel's centre, so sums are
-/// relative to the centre.
+/// narrow() adds the height in that column. The added height is 2^14 for a line at the pixel's centre, so the 2^14
+/// cancels and sums are relative to the centre.
 PICTURA_HD inline Int16x8 column_heights(const PolygonEdge& edge) {
   return arithmetic_sequence(edge.rows_step, (1 << 16) - (1 << 14));
 }

@@ -33,7 +33,7 @@ PICTURA_HD inline float box_radius_m(const AgentBox& box) {
 }
 
 PICTURA_HD inline bool may_be_visible(const Strip& strip, const PinholeCamera& camera, const Frustum& f) {
-  // Widening stays within the guard band.
+  // The radius excludes the strip's widening on screen, because the frustum's guard band is wider.
   return sphere_in_frustum(f, to_camera(camera, strip_middle(strip)), strip_radius_m(strip));
 }
 

@@ -43,8 +43,8 @@ constexpr float kLevel_px = 1e-6f, kUpright_px = 1e-6f;
 constexpr int kSampleColumns = kInt16x8Size, kSampleRows = 8;
 /// Sample tests use 16-bit heights, kRowUnits per row, relative to the pixel's centre. Heights are clamped to
 /// +-kLines_rows / 2 in the first column right of the centre. They change by at most kSteepest rows per column, so 16
-/// bits do not overflow. Steeper lines get this slope. With their own slope, upright lines would cut off whole columns
-/// of samples, that is, eighths of the pixel.
+/// bits do not overflow. Steeper lines get this slope. With its own slope, an upright line would cut off only whole
+/// columns of samples, each an eighth of the pixel.
 constexpr int kRowUnits = 128;
 constexpr float kLines_rows = 256.0f, kSteepest = 9.0f;
 

@@ -164,7 +164,7 @@ PICTURA_HD inline float face_depth_m(const ScreenFace& face, Vec2 at_px) {
 /// because a widened strip may extend beyond the horizon of its plane.
 PICTURA_HD inline bool of_one_level(const ScreenFace& a, const ScreenFace& b, Vec2 at_px) {
   const float nearest = max_of(clamped_inverse_depth(a, at_px), clamped_inverse_depth(b, at_px));
-  // Heights above the two planes, times the inverse depth.
+  // Heights of the point at this depth above the two planes, times `nearest`.
   const float above_a = (inverse_depth(a, at_px) - nearest) * a.plane_distance_m,
               above_b = (inverse_depth(b, at_px) - nearest) * b.plane_distance_m;
   return fabsf(above_a - above_b) < kSameLevel_m * nearest;

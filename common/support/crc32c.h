@@ -1,4 +1,4 @@
-// CRC-32C checksums (Castagnoli; reflected polynomial 0x1EDC6F41).
+// CRC-32C checksums (Castagnoli's polynomial 0x1EDC6F41, reflected to 0x82F63B78).
 #pragma once
 
 #include <array>

@@ -57,7 +57,7 @@ struct PedestrianResults : ProbeResults {
   float hider_range_m = 0, min_speed_mps = 0, height_m = 0;
   PedestrianControl control = PedestrianControl::none;
   std::vector<PedestrianPath> paths;    // ordered by scene, step, ego and hider
-  std::vector<PedestrianPoint> points;  // ordered by path and distance
+  std::vector<PedestrianPoint> points;  // ordered by path and along_m
   CompiledMaps maps;                    // for figures, as are the cameras
   RendererConfig cameras;
 };

@@ -79,8 +79,8 @@ struct ProbePair {
   int32_t measured_box = -1;  // box whose visibility is measured; -1: none (NaN)
 };
 
-/// Cases still to be drawn. The numbers of cases per scene differ by at most one. A scene's cases spread evenly over
-/// its samples if every sample offers enough.
+/// Cases still to be selected. The numbers of cases per scene differ by at most one. A scene's cases are spread evenly
+/// over its sampled steps if each of them offers enough cases.
 class CaseQuota {
  public:
   CaseQuota(int64_t cases, const ProbeOptions& options) : cases_(cases), options_(options) {}
@@ -131,8 +131,8 @@ class ProbeRun final : public EvaluationObserver {
   const CompiledMaps& maps() const { return maps_; }
   Renderer& measuring() { return *measuring_; }
   Device device() const { return device_; }
-  /// Return a policy's responding session, its renderer (null without images), and the configuration of its
-  /// observations.
+  /// Return the session that responds for a policy (ProbeKind), the policy's renderer (null without images), and the
+  /// configuration of the policy's observations.
   PolicySession& session(size_t policy) const;
   Renderer* renderer(size_t policy) const;
   SimulatorConfig world_of(size_t policy) const;

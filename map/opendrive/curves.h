@@ -103,8 +103,8 @@ constexpr int inner_border(int lane_id) { return lane_id > 0 ? lane_id - 1 : lan
 std::vector<double> formula_changes(const FileRoad& road, const FileSection& section, int border, double begin,
                                     double end);
 
-/// Returns formula_changes(). Without banking, also bounds the second derivatives of the lane's width and of positions.
-/// The bounds include positions up to `beyond_m` outside the lane.
+/// Returns formula_changes(). On roads without banking, the result also bounds the second derivatives of positions and
+/// of half the lane's width. The bounds include positions up to `beyond_m` outside the lane.
 CurveBreaks breaks_of(const FileRoad& road, const FileSection& section, int lane, double begin, double end,
                       double beyond_m = 0);
 

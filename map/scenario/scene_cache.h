@@ -16,7 +16,7 @@ namespace pictura {
 /// Inputs that, with the importers, determine a scene.
 struct SceneCacheKey {
   static constexpr int64_t kIndex = -2;
-  // Hash of the scene's bytes; for kIndex, hash of the records' lengths and checksums.
+  // Hash of the scene's bytes or, if `record` is kIndex, of the records' lengths and checksums.
   uint64_t content = 0;
   // Index of the record in a TFRecord file; -1 for a file that holds one scene; kIndex for a file's list of records.
   int64_t record = 0;

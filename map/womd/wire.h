@@ -42,8 +42,8 @@ class WireReader {
   }
 
   /// Reads only the tag of the next field, whose value may be beyond this reader's bytes. Returns the sizes of the tag
-  /// and of the value, in bytes. The tag includes a length prefix; for a varint, it also includes the value, whose
-  /// returned size is 0.
+  /// and of the value, in bytes. The tag's size includes a length prefix or a varint's value; the value's size is 0 for
+  /// a varint.
   std::pair<std::size_t, uint64_t> next_extent() {
     const std::size_t before = rest_.size();
     take_tag();

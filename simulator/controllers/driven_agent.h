@@ -24,7 +24,7 @@ class DrivenAgent {
   bool leaves_road(const Motion& at, float z_m, float margin_m) const;
   /// Whether the front bumper crosses an exit of the map.
   bool crosses_exit(const Motion& before, const Motion& after, float z_m) const;
-  /// Distance from the rear axle.
+  /// Distance from the rear axle to the front bumper.
   float to_bumper_m() const;
   float wheelbase_m() const { return parameters_.wheelbase_m; }
   float dt_s() const { return world_.options.dt_s; }

@@ -75,7 +75,7 @@ class LaneKeepingAgent {
   int32_t chain_ = -1;
   LanePath path_;
   size_t place_ = 0;                           // nearest point of the path
-  std::array<size_t, kNumWaypoints> goals_{};  // points at waypoints_
+  std::array<size_t, kNumWaypoints> goals_{};  // indices of the path's points at the waypoints
   DrivingPlan plan_;
   size_t next_planned_ = 0;
   const size_t max_search_nodes_;

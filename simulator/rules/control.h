@@ -17,7 +17,7 @@ PICTURA_HD inline int32_t random_action(uint64_t seed, uint32_t global_world, in
   return random.below(kNumActions);
 }
 
-/// Number of steps of a world, including steps that began episodes.
+/// Number of steps of a world, including steps that only reset it.
 PICTURA_HD inline uint32_t steps_of(const SimulatorTotals& world_totals, int32_t num_agents) {
   return static_cast<uint32_t>(world_totals.slot_steps / num_agents);
 }

@@ -104,9 +104,9 @@ PICTURA_HD inline void count_agent(const WorldView& world, int agent, const Step
   count_events(world.agents.events[slot], totals_inout);
 }
 
-/// Maximum number of steps of the current episode, T = episode_steps. With stagger_episodes, it is drawn, so that
-/// worlds do not end episodes together: U{64, ..., T} for the first episode. Later ones have U{T - floor(T / 8), ...,
-/// T}, because worlds that ended together would otherwise do so again after T steps.
+/// Maximum number of steps of the current episode, T = episode_steps. With stagger_episodes, the first episode draws it
+/// from U{64, ..., T}, so that worlds do not end episodes together. Later ones have U{T - floor(T / 8), ..., T},
+/// because worlds that ended together would otherwise do so again after T steps.
 PICTURA_HD inline int max_steps_of(const WorldView& world) {
   constexpr int kMinSteps = 64;
   const int episode_steps = world.options.episode_steps;

@@ -29,7 +29,8 @@ PICTURA_HD inline int draw_driver_kind(const OtherShares& shares, uint64_t seed,
   return 0;
 }
 
-/// Convert a driver kind. driver_of() is 0 for the learning policy, and 1 + i for policy i of OtherShares::policies.
+/// Return the impairment or the driver of a driver kind. driver_of() is 0 for the learning policy, and 1 + i for policy
+/// i of OtherShares::policies.
 PICTURA_HD constexpr Impairment impairment_of(int other) {
   return other > kNumImpairments ? Impairment::none : static_cast<Impairment>(other);
 }

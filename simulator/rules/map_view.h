@@ -91,7 +91,7 @@ struct StopLine {
   Vec3 middle_m;
   Vec2 direction;  // direction of the controlled traffic
   float half_length_m = 0;
-  float beyond_left_m = 0, beyond_right_m = 0;  // to the far side of adjacent oncoming lanes
+  float beyond_left_m = 0, beyond_right_m = 0;  // from each end to the far side of adjacent oncoming lanes
   int32_t junction = -1, phase = 0, num_phases = 1;
 };
 

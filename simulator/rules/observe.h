@@ -108,7 +108,7 @@ PICTURA_HD auto nearest_partners(const WorldView& world, int agent, Vec2 origin,
   }
 }
 
-/// Searches the boxes box_at(i), i < num_boxes, for which is_present(i) holds.
+/// Finds the nearest drawn boxes among box_at(i), i < num_boxes, with is_present(i).
 template <typename ThreadGroup, typename BoxAt, typename IsPresent>
 PICTURA_HD auto nearest_boxes(int num_boxes, const BoxAt& box_at, const IsPresent& is_present, Vec2 origin,
                               const ThreadGroup& group) {

@@ -20,9 +20,9 @@ struct LightPlan {
 
 /// Draws a stop line's plan for an episode. By default (training), each junction has green U(1, 10) s, yellow U(1.5,
 /// 2.25) s, red U(0.3, 10) s and a time offset. In a fifth of the episodes all lights are off; in the others, a fifth
-/// of the lights are off. Independent cycles are drawn for each light; with probability 0.05, a light that is not off
-/// stays green throughout the episode. With `fixed` (evaluation), durations are 10, 3 and 2 s, and only the offset is
-/// drawn. A line that belongs to no junction has its own cycle.
+/// of the lights are off. With LightCycles::independent, each light has its own cycle, and a light that is not off
+/// stays green throughout the episode with probability 0.05. With `fixed` (evaluation), durations are 10, 3 and 2 s,
+/// and only the offset is drawn. A line that belongs to no junction has its own cycle.
 PICTURA_HD inline LightPlan draw_light_plan(const StopLine& line, int32_t light, LightCycles cycles, bool fixed,
                                             float dt_s, uint64_t seed, uint32_t world, uint32_t episode) {
   constexpr float kOffFraction = 0.2f, kAlwaysGreenFraction = 0.05f;

@@ -95,7 +95,7 @@ PICTURA_HD inline AgentBox with_clearance(AgentBox box) {
   return box;
 }
 
-/// Maximum distance between the centres of `inflated`, a result of with_clearance(), and of a box that overlaps it.
+/// Maximum distance at which another box's centre can be if the box overlaps `inflated` (from with_clearance()).
 PICTURA_HD inline float clearance_reach_m(const MapView& map, const AgentBox& inflated) {
   return radius(inflated) + map.max_box_radius_m;
 }

@@ -23,8 +23,8 @@ PICTURA_HD inline bool filter_keeps(float advantage, bool is_valid, float thresh
   return is_valid && (advantage < 0 ? -advantage : advantage) >= threshold;
 }
 
-/// Bins for counting |advantages|. A bin is the upper half of a number's bits: 128 equal bins between powers of two.
-/// The last bin counts values that are not finite. Integer counts let ranks sum exactly.
+/// Bins for counting |advantages|. A bin's index is the upper 16 bits of an |advantage|, so 128 equal bins lie between
+/// consecutive powers of two. The last bin counts values that are not finite. Integer counts let ranks sum exactly.
 constexpr int kNotFiniteBin = 0x7f80;
 constexpr int kNumFilterBins = kNotFiniteBin + 1;
 
