@@ -53,7 +53,7 @@ Text text_of(RepairKind kind) {
     case RepairKind::unknown_orientation: return {"unknown orientations of signals", "they face both ways"};
     case RepairKind::negative_size: return {"sizes below zero", "the default size counts"};
     case RepairKind::endless_dash: return {"dashes of no length", "painted without gaps"};
-    case RepairKind::empty_line: return {"single mark lines of no length", "left out"};
+    case RepairKind::empty_line: return {"explicit mark lines of no length", "left out"};
     case RepairKind::self_crossing_mark: return {"road marks that run back on themselves", "that part is left out"};
     case RepairKind::unreadable_speed: return {"speed limits that cannot be read", "left out"};
     case RepairKind::misplaced_item: return {"objects and signals far from their road", "left out"};
