@@ -68,7 +68,7 @@ Text text_of(RepairKind kind) {
     case RepairKind::wrong_end: return {"links to the wrong end of a road", "the end that touches counts"};
     case RepairKind::one_sided_link: return {"one-sided links of roads", "made mutual"};
     case RepairKind::unreturned_link:
-      return {"links to a road end that links to a third road", "kept, because the ends touch"};
+      return {"links to a road end that is itself linked to another road", "kept, because the ends touch"};
     case RepairKind::contrary_link:
       return {"links to a road's end that is linked elsewhere and does not touch", "left out"};
     case RepairKind::dangling_link: return {"links of lanes at a road end without a road link", "left out"};
@@ -84,7 +84,7 @@ Text text_of(RepairKind kind) {
     case RepairKind::uncontrolled_light:
       return {"lights without a controller",
               "at junctions, similar headings share a phase; elsewhere each light cycles alone"};
-    case RepairKind::unlisted_light: return {"lights that no controller of their junction lists", "left out"};
+    case RepairKind::unlisted_light: return {"lights that are in no controller of their junction", "left out"};
     case RepairKind::laneless_light: return {"lights without a lane", "left out"};
     case RepairKind::missing_link:
       return {"missing links between lanes that touch", "routes end with the lane that lacks a link"};

@@ -282,8 +282,7 @@ constexpr float kWidenedDepth = 2.0f;
 /// Relative difference below which depths are equal, so that rounding does not order faces in one plane.
 constexpr float kEqualDepth = 1e-4f;
 /// A solid (box, wall or light) stands on a strip if both overlap on the ground plane and the centre of the solid's
-/// base is at most this far from the strip's plane. The centre of the solid's base must also be at most this far from
-/// the strip's plane. Upright boxes cut into slopes, so the distance is not 0.
+/// base is at most this far from the strip's plane. Upright boxes cut into slopes, so the distance is not 0.
 constexpr float kStanding_m = 0.5f;
 /// Maximum distance by which solids extend below the strip on which they stand. Only culling uses it.
 constexpr float kThroughStrip_m = 4.0f * kStanding_m;

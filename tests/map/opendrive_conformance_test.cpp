@@ -124,7 +124,7 @@ std::vector<BrokenRule> broken_rules() {
        with_sections(section(0, width_to_zero(-1, next)) + section(50, linked(-1, 3, before)))},
       {"1.7.0:road.lane.link.zero_width_at_start", "a lane of no width with a predecessor",
        with_sections(section(0, linked(-1, 3, next)) + section(50, linked(-1, 0, before)))},
-      {"1.7.0:road.lane.level_true_one_side", "a level lane, beside one outside it that is not level",
+      {"1.7.0:road.lane.level_true_one_side", "a level lane whose outer neighbour is not level",
        with_lanes("",
                   replaced(lane_of(-1, "driving", 3), "type", R"(level="true" type)") + lane_of(-2, "sidewalk", 2))},
       {"1.7.0:road.lane.access.no_mix_of_deny_or_allow", "access denied and allowed",
