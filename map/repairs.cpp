@@ -30,12 +30,12 @@ Text text_of(RepairKind kind) {
     case RepairKind::short_section: return {"lane sections of no length", "left out; links lead through them"};
     case RepairKind::empty_geometry: return {"geometries of no length", "left out"};
     case RepairKind::parameter_range:
-      return {"parameter ranges that do not fit the length", "the range that fits counts"};
+      return {"parameter ranges that do not fit the length", "the other range counts, which fits"};
     case RepairKind::line_length: return {"curves of another length than stated", "the curve's own length counts"};
     case RepairKind::geometry_station:
       return {"geometries that do not begin where the one before ends", "the one before is cut or extended"};
     case RepairKind::moved_geometry:
-      return {"geometries whose s is far from the end of the one before", "their s becomes that end"};
+      return {"geometries whose s is far from the end of the one before", "moved along s to that end"};
     case RepairKind::geometry_jump:
       return {"jumps of the reference line", "spread over ten metres, or ten times their size if more"};
     case RepairKind::geometry_gap: return {"gaps between geometries", "bridged by a straight line"};
