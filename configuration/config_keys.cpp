@@ -54,7 +54,7 @@ class Describer {
   }
   void range(const std::string& key, const ConditioningRange& value) {
     add(key, value.mixture ? "0 < low <= 1 <= high, or low = high > 0"
-                           : fmt::format("low <= high, of {} to {}", text_of_number(-kMaxConditioning),
+                           : fmt::format("low <= high, both from {} to {}", text_of_number(-kMaxConditioning),
                                          text_of_number(kMaxConditioning)));
   }
 
