@@ -45,7 +45,7 @@ struct TrainSection {
   double weight_average = 0;
   // Agent-steps in which the policy's logits double (training/schedule.h); 0: never.
   int64_t sharpen_agent_steps = 0;
-  /// Path of a saved vector policy that the learner imitates (training/teacher.h), relative to the configuration's
+  /// Path of a saved policy that the learner imitates (training/teacher.h), relative to the configuration's
   /// folder. The weight of the KL loss falls linearly from teacher_coef to 0 over teacher_agent_steps.
   std::string teacher;
   double teacher_coef = 1;

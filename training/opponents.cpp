@@ -24,10 +24,9 @@ namespace {
 // Returns an opponent's configuration. Observations and decision steps are those of its training. The sections `run`
 // and `train` are those of the run, because threads, precision and determinism are settings of the process.
 Config config_of(const SavedPolicy& saved, const Config& run) {
-  Config config = saved.config;
+  Config config = with_session_options(saved.config, {});
   config.run = run.run;
   config.train = run.train;
-  if (config.render.backend == "cpu" || config.render.backend == "cuda") config.render.backend = "auto";
   const std::string key = fmt::format("{}: simulator.others.policies", saved.path);
   PICTURA_CHECK(run.reads_images() || run.policy.auxiliary || config.reads_images() || !config.policy.auxiliary,
                 "{}: its policy.auxiliary is true, expected false, as in the learner", key);

@@ -20,10 +20,10 @@ namespace pictura {
 
 namespace {
 
-std::unique_ptr<const Teacher> make_teacher(const Config& config, Device device, Communicator* communicator) {
+std::unique_ptr<Teacher> make_teacher(const Config& config, Device device, Communicator* communicator) {
   const std::string& path = config.train.teacher;
   if (path.empty()) return nullptr;
-  return std::make_unique<const Teacher>(parse_policy(file_of_first(path, communicator), path), config, device);
+  return std::make_unique<Teacher>(parse_policy(file_of_first(path, communicator), path), config, device);
 }
 
 std::unique_ptr<Opponents> make_opponents(const Config& config, Device device, Communicator* communicator) {
@@ -99,6 +99,7 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
       chunks(*policy, rollout.observations, &timer, &graphs) {
   if (config.train.weight_average > 0) average.emplace(*policy, config.train.weight_average);
   if (teacher) {
+    teacher->enter(*simulator);
     rollout.teacher_log_probs =
         at::zeros({rollout.num_steps(), rollout.num_slots(), kNumActions}, rollout.log_probs.options());
   }
@@ -217,6 +218,7 @@ void Run::enter_scenes(int64_t set) {
   });
   scene_set = set;
   if (renderer) upload_maps(*simulator, renderer.get());
+  if (teacher) teacher->enter(*simulator);
   if (opponents) opponents->enter(*simulator);
 }
 

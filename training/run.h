@@ -56,8 +56,8 @@ struct Run {
   Communicator* const communicator;
   const std::vector<WorldSpec> all_worlds;  // worlds of all ranks
   Rig rig;
-  const std::unique_ptr<const Teacher> teacher;  // null without train.teacher
-  const std::unique_ptr<Opponents> opponents;    // null without simulator.others.policies
+  const std::unique_ptr<Teacher> teacher;      // null without train.teacher
+  const std::unique_ptr<Opponents> opponents;  // null without simulator.others.policies
   const SimulatorConfig world;
   const std::unique_ptr<SceneSets> scenes;  // null without recorded scenes
   const std::unique_ptr<Simulator> simulator;

@@ -157,12 +157,14 @@ TEST_F(DeviceTraining, SegmentsAreReadAsOnTheHost) {
 }
 
 TEST_P(EachModality, ATeacherTeachesAsOnTheHost) {
-  train(options("teacher", "cpu", {"policy.modality=vector", "run.seed=5", "train.updates=1"}));
-  std::vector<std::string> more = one_update();
-  more.push_back("train.teacher=" + (folder_ / "teacher/policy.safetensors"));
-  train(options("host", "cpu", more));
-  train(options("device", "cuda", more));
-  expect_same_first_update(folder_ / "host", folder_ / "device", 1e-6, 2e-2);
+  for (const std::string reads : {"vector", "perspective"}) {
+    train(options(reads, "cpu", {"policy.modality=" + reads, "run.seed=5", "train.updates=1"}));
+    std::vector<std::string> more = one_update();
+    more.push_back("train.teacher=" + (folder_ / (reads + "/policy.safetensors")));
+    train(options(reads + "_host", "cpu", more));
+    train(options(reads + "_device", "cuda", more));
+    expect_same_first_update(folder_ / (reads + "_host"), folder_ / (reads + "_device"), 1e-6, 2e-2);
+  }
 }
 
 TEST_P(EachModality, EvaluationAgreesWithTheHosts) {

@@ -87,6 +87,24 @@ TEST_F(TeacherTest, APolicyOfImagesComesToActAsItDoes) {
   EXPECT_LT(with.back(), 0.5 * with.front());
 }
 
+TEST_F(TeacherTest, TeachesByItsOwnImages) {
+  // The learner's images are larger and its cameras are randomized; the teacher draws as in its training.
+  const std::string teacher = policy_of("teacher", {"train.sharpen_agent_steps=8"});
+  for (const std::string modality : {"perspective", "vector"}) {
+    std::vector<std::string> settings{
+        "train.teacher=" + teacher, "train.teacher_coef=5",        "train.updates=30",
+        "train.learning_rate=3e-3", "train.warm_up_agent_steps=0", "policy.modality=" + modality};
+    if (modality == "perspective") {
+      settings.insert(settings.end(),
+                      {"render.width_px=48", "render.height_px=27", "render.randomization.rotation_deg=3"});
+    }
+    train(small_run(folder_ / modality, "cpu", settings));
+    const std::vector<double> with = divergences(folder_ / modality);
+    EXPECT_GT(with.front(), 0.05) << modality;
+    EXPECT_LT(with.back(), 0.5 * with.front()) << modality;
+  }
+}
+
 TEST_F(TeacherTest, OneThatWeighsNothingChangesNoBit) {
   const std::string teacher = vector_policy("teacher");
   const std::vector<std::string> plain{"train.updates=2"},
@@ -97,12 +115,14 @@ TEST_F(TeacherTest, OneThatWeighsNothingChangesNoBit) {
 }
 
 TEST_F(TeacherTest, RunsGoOnExactly) {
-  const std::string teacher = vector_policy("teacher");
-  const auto [whole, again, resumed] = test::policies_of_equal_runs(
-      folder_.path(), "cpu", {"train.teacher=" + teacher, "train.teacher_agent_steps=300"});
-  EXPECT_EQ(again, whole);
-  EXPECT_EQ(resumed, whole);
-  EXPECT_NE(train(small_run(folder_ / "alone", "cpu", {"train.updates=2"})).policy_hash, whole);
+  const std::string alone = train(small_run(folder_ / "alone", "cpu", {"train.updates=2"})).policy_hash;
+  for (const std::string& teacher : {vector_policy("vectors"), policy_of("images", {"train.sharpen_agent_steps=8"})}) {
+    const auto [whole, again, resumed] = test::policies_of_equal_runs(
+        teacher + ".runs", "cpu", {"train.teacher=" + teacher, "train.teacher_agent_steps=300"});
+    EXPECT_EQ(again, whole);
+    EXPECT_EQ(resumed, whole);
+    EXPECT_NE(alone, whole);
+  }
 }
 
 TEST_F(TeacherTest, RunsThatHoldActionsGoOnExactly) {
@@ -123,9 +143,7 @@ TEST_F(TeacherTest, OthersAreRefusedByName) {
     settings.push_back("train.teacher=" + teacher);
     return test::message_of([&] { train(small_run(folder_ / "student", "cpu", settings)); });
   };
-  const std::string images = policy_of("images", {}), vectors = vector_policy("vectors", {"policy.auxiliary=true"});
-  EXPECT_THAT(message(images),
-              ::testing::HasSubstr(images + ": train.teacher: its policy reads images, expected a policy of"));
+  const std::string vectors = vector_policy("vectors", {"policy.auxiliary=true"});
   EXPECT_THAT(message(vectors, {"policy.modality=vector"}),
               ::testing::HasSubstr(vectors + ": train.teacher: its policy.auxiliary is true, expected false"));
   EXPECT_THAT(message(folder_ / "absent.safetensors"), ::testing::HasSubstr("absent.safetensors"));
