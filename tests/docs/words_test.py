@@ -32,7 +32,6 @@ EXEMPT = {
     "docs/reference/configuration.md": {"page", "total", "cell"},  # tests/configuration/config_test.cpp
     "docs/reference/python/*.md": ALL,  # generated from docstrings
     "docs/reference/opendrive_conformance.md": ALL,  # tests/map/opendrive_elements_test.cpp and ..._conformance_test.cpp
-    "docs/reference/map_cases.md": {"cell", "turn", "total"},  # tests/map/opendrive_cases_test.cpp
     "docs/changelog/*.md": {"total"},  # CHANGELOG.md by version
     "docs/research/*.md": ALL,
     "docs/developer/*.md": {"page"},

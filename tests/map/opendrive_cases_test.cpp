@@ -1,4 +1,4 @@
-// Small files like those that other tools write, and the table of these files in docs/reference/map_cases.md.
+// Small files like those that other tools write, and the table of these files in docs/research/map_cases.md.
 #include <string>
 #include <vector>
 
@@ -52,7 +52,7 @@ TEST(OpenDriveCases, ThePageSaysWhatIsMadeOfEachFile) {
                          map.facts.driving_lane_km, use.endless, use.open, done.empty() ? "accepted" : done);
   }
   const std::string docs = read_file(PICTURA_MAP_CASES_DOCS);
-  EXPECT_TRUE(docs.find(table) != std::string::npos) << "expected in docs/reference/map_cases.md:\n" << table;
+  EXPECT_TRUE(docs.find(table) != std::string::npos) << "expected in docs/research/map_cases.md:\n" << table;
 }
 
 }  // namespace
