@@ -5,6 +5,7 @@ import re
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FENCE = re.compile(r"^ *```")
+DOCSTRING = re.compile(r"^::: ")  # with indented options below; mkdocstrings writes a docstring in its place
 ITEM = re.compile(r"^ *(?:[-*]|\d+\.) +")
 
 
@@ -14,12 +15,12 @@ def documents():
 
 
 def without_blocks(text):
-    """The text with the lines of code blocks emptied, so that line numbers hold."""
+    """Returns the text without code blocks and `:::` blocks. Their lines are empty, so that line numbers remain the same."""
     lines, in_code = [], False
     for line in text.split("\n"):
         is_fence = bool(FENCE.match(line))
         is_indented = line.startswith("    ") and not ITEM.match(line) and (not lines or not lines[-1].strip())
-        lines.append("" if in_code or is_fence or is_indented else line)
+        lines.append("" if in_code or is_fence or is_indented or DOCSTRING.match(line) else line)
         in_code ^= is_fence
     return "\n".join(lines)
 
@@ -59,8 +60,8 @@ def links(text):
 
 
 def blocks(text):
-    """[(kind, line, text)] of a page in order: "paragraph", "item" of a list, "cell" of a table, "heading". No code blocks; the line
-    is that on which the block begins."""
+    """[(kind, line, text)] of a page in order: "paragraph", "item" of a list, "cell" of a table, "heading". No code or
+    `:::` blocks; the line is that on which the block begins."""
     found, is_open = [], False
     for number, line in enumerate(without_blocks(text).split("\n"), 1):
         stripped = line.strip()
