@@ -131,7 +131,7 @@ class Backbones(unittest.TestCase):
         return {key: data[begin + entry["data_offsets"][0] : begin + entry["data_offsets"][1]]
                 for key, entry in header.items() if key != "__metadata__"}  # fmt: skip
 
-    def test_a_frozen_one_is_no_part_of_the_policy_but_decides_it(self):
+    def test_a_frozen_backbone_is_not_saved_but_affects_the_policy(self):
         vit, other = self.export("make", "vit.pt"), self.export("make_other", "other.pt")
         whole = self.json_of(*self.train(vit, "whole", 2))
         weights = self.weights("whole")
@@ -154,7 +154,7 @@ class Backbones(unittest.TestCase):
         # Images of any size.
         self.assertGreater(self.json_of(*evaluate, "--backbone", moved, "--size", "33x17")["agent_steps"], 0)
 
-    def test_a_trained_one_is_learnt_saved_and_resumed_like_all_parameters(self):
+    def test_a_trained_backbone_is_learnt_saved_and_resumed(self):
         vit = self.export("make", "vit.pt")
         trained = ["--set", "policy.backbone_frozen=false"]
         whole = self.json_of(*self.train(vit, "whole", 2, *trained))
@@ -168,7 +168,7 @@ class Backbones(unittest.TestCase):
             self.assertNotEqual(first[name], self.weights("parts")[name], name)
         self.assert_refused(["policy.backbone_frozen: false became true"], *self.train(vit, "parts", 3, "--resume"))
 
-    def test_bad_ones_are_refused_by_name(self):
+    def test_errors_name_bad_backbones(self):
         text = self.folder / "text.pt"
         text.write_text("no program")
         self.assert_refused([str(text), "TorchScript"], *self.train(text, "run", 1))

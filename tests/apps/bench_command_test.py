@@ -47,7 +47,7 @@ class Benchmarks(CommandCase):
             self.assertAlmostEqual(rate * call / 1e3 / egos, 1, places=6)
             self.assertAlmostEqual(image * 4 * egos / call, 1, places=6)
 
-    def test_a_history_is_drawn_as_it_was_seen_and_its_rate_measured_against_the_present(self):
+    def test_history_rendering_is_measured_relative_to_the_present_scene(self):
         small = [*self.QUICK, "--slots", 12, "--steps", 4, "--views", 10, "--size", "8x8"]
         facts = self.json_of("bench", "history", *small, "--check", 5)
         self.assertIn("images of 5 agents out of the history equal those drawn at the time", facts["workload"])
@@ -145,7 +145,7 @@ class Benchmarks(CommandCase):
         self.assertGreater(values["lane driver: goals"]["mean"], 0)
         self.assertEqual(values["lane driver: red lights"]["max"], 0)
 
-    def test_a_soak_names_the_images_that_are_out_of_tolerance(self):
+    def test_a_soak_names_images_out_of_tolerance(self):
         soak = ["bench", "soak", "--map", "procedural:1", "--agents", 20, "--views", 2]
         oracle = self.json_of(*soak, "--backend", "cpu", "--scenes", 3)
         self.assertEqual((oracle["scenes"], oracle["images_out_of_tolerance"], oracle["worst"]), (3, 0, 0))
@@ -164,7 +164,7 @@ class Benchmarks(CommandCase):
         for key in ("faults", "visibility_faults"):
             self.assertEqual([fault for fault in again[key] if fault["scene"] == 2], black[key])
 
-    def test_rates_of_rendering_are_drawn_from_results_of_one_benchmark_or_of_several(self):
+    def test_rendering_rates_are_drawn_from_several_result_files(self):
         names = ["cuda 32x18 2048 egos", "cuda 96x54 2048 egos", "cuda 96x54 64 egos", "cpu 64x64 2048 egos"]
         one = {"results": [{"name": name, "value": 1e5 + 1e5 * i} for i, name in enumerate(names)]}
         results, figure, again = (self.folder / name for name in ("results.json", "rates.png", "again.png"))
@@ -180,7 +180,7 @@ class Benchmarks(CommandCase):
         self.assertNotEqual(figure.read_bytes(), again.read_bytes())
         self.assert_refused(2, "--plot and --figure", "bench", "render", "--figure", figure)
 
-    def test_rates_on_several_gpus_are_drawn_from_what_gpu_ranks_measured(self):
+    def test_rates_on_several_gpus_are_drawn_from_gpu_ranks_results(self):
         def row(case, gpus, rate):
             rates = {"median": rate, "min": 0.9 * rate, "max": 1.1 * rate}
             return {"case": case, "gpus": gpus, "agent_steps_per_s": rates, "efficiency": rate / gpus / 1e5}
@@ -211,7 +211,7 @@ class Benchmarks(CommandCase):
         refused(2, "--worlds excludes --sweep", "bench", "simulate", "--sweep", "worlds", "--worlds", 3)
         refused(2, "vulkan", "bench", "simulate", *self.QUICK, "--backend", "cpu,vulkan", "--map", "no-town.xodr")
 
-    def test_bad_arguments_are_refused_by_name(self):
+    def test_errors_name_bad_arguments(self):
         def refused(status, message, *arguments):
             self.assert_refused(status, message, "bench", "render", *self.QUICK, *arguments)
 
@@ -231,7 +231,7 @@ class Benchmarks(CommandCase):
 
 
 class TrainingBenchmarks(CommandCase):
-    def test_bench_train_says_what_simulated_drew_and_learnt(self):
+    def test_bench_train_prints_simulator_renderer_and_device(self):
         facts = self.json_of("bench", "train", "--updates", 2, "--config", CONFIGS / "smoke.toml", "--renderer", "null",
                              "--device", "cpu")  # fmt: skip
         self.assertEqual(facts["backend"], "simulator cpu, renderer null, learning on cpu")
@@ -252,7 +252,7 @@ class TrainingBenchmarks(CommandCase):
         self.assertIn("weights of", facts["workload"])
         self.assert_refused(1, "no.ckpt", *bench, "--init-from", self.folder / "no.ckpt")
 
-    def test_where_the_time_of_an_update_goes_is_measured_by_size_and_renderer(self):
+    def test_breakdown_of_an_update_is_measured_by_size_and_renderer(self):
         if run("bench", "breakdown", "--help").returncode != 0:
             self.skipTest("built without benchmarks")
         small = ["--config", CONFIGS / "smoke.toml", "--device", "cpu", "--updates", 2, "--check", 2,

@@ -7,7 +7,7 @@ from command_case import TINY, CommandCase, run
 
 
 class Evaluation(CommandCase):
-    def test_exported_weights_drive_as_the_checkpoint_does(self):
+    def test_exported_weights_and_checkpoint_drive_identically(self):
         run_folder, weights = self.folder / "run", self.folder / "weights.safetensors"
         trained = self.json_of("train", *TINY, "--set", "train.updates=1", "--out", run_folder)
         whole = self.json_of("export", run_folder / "checkpoint.ckpt", "--weights", "f32", "--out", weights)
@@ -95,7 +95,7 @@ class Evaluation(CommandCase):
         self.assert_refused(2, "lane reads no images", *evaluate, "--policy", "lane", "--renderer", "cpu")
         self.assert_refused(2, "expected a CHECKPOINT, --policy, or --merge", *evaluate)
 
-    def test_a_policy_is_driven_in_the_world_that_it_was_trained_in(self):
+    def test_evaluation_uses_the_world_settings_of_training(self):
         out = self.folder / "run"
         self.json_of("train", *TINY, "--set", "train.updates=1", "--set", "simulator.walls=true",
                      "--set", "simulator.wall_seed=9", "--set", "simulator.parked_cars=2",

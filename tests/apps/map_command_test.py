@@ -34,7 +34,7 @@ class Maps(CommandCase):
         self.assertEqual(first, self.town(seed=5).read_bytes())
         self.assertNotEqual(first, self.town(seed=6).read_bytes())
 
-    def test_a_family_has_the_options_that_are_not_given(self):
+    def test_a_family_sets_the_default_options(self):
         town, named = self.folder / "city.xodr", self.folder / "named.xodr"
         written = self.json_of("town", "--family", "city", "--seed", 5, "--hills-m", 0, "--out", town)
         self.assertEqual((written["blocks_x"], written["blocks_y"], written["motorway"], written["hills-m"]), (4, 3, 1, 0))
@@ -132,7 +132,7 @@ class Maps(CommandCase):
         self.assertEqual([facts[key] for key in same], [again[key] for key in same])
         self.assert_refused(1, "/proc/nowhere", "map", first, "--xodr", "/proc/nowhere/out.xodr")
 
-    def test_mended_faults_are_counted_and_listed(self):
+    def test_repaired_faults_are_counted_and_listed(self):
         town = self.town()
         text = town.read_text()
         town.write_text(text.replace('type="driving"', 'type="canal"', 3).replace('elementId="', 'elementId="no', 1))
@@ -161,7 +161,7 @@ class Maps(CommandCase):
         self.assertEqual(self.json_of("map", town, "--strict")["mends"], [])
         self.assert_refused(2, "--lenient: was removed", "map", town, "--lenient")
 
-    def test_bad_files_are_refused_by_name(self):
+    def test_errors_name_bad_files(self):
         text = self.town().read_text()
         bad = self.folder / "bad.xodr"
         cases = {
@@ -196,7 +196,7 @@ class MapCases(CommandCase):
                 self.json_of("render", path, "--agents", 4, "--steps", 5, "--views", 1, "--out", self.folder / "images")
                 self.json_of("replay", path, "--agents", 4, "--steps", 20, "--policy", "lane", "--out", self.folder / "drive.html")
 
-    def test_policies_are_trained_and_evaluated_on_all_at_once(self):
+    def test_policies_train_and_are_evaluated_on_all_maps(self):
         if not has_torch():
             self.skipTest("built without torch")
         names = ",".join(map(str, MAP_CASES))

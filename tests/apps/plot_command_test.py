@@ -67,7 +67,7 @@ class Plots(CommandCase):
         self.assertIn("curves.png: runs 3, lines 2, panels 1",
                       run("plot", a, b, c, "--metrics", "goals_per_1000_steps", "--out", picture).stdout)  # fmt: skip
 
-    def test_what_is_missing_is_named(self):
+    def test_errors_name_missing_data(self):
         a = self.run_folder("a", 1, [1, 2])
         out = ["--out", self.folder / "curves.png"]
         self.assert_refused(1, "nowhere: expected the folder of a training run", "plot", self.folder / "nowhere", *out)
@@ -78,7 +78,7 @@ class Plots(CommandCase):
         self.assert_refused(2, "expected a name that ends in .png or .svg", "plot", a, "--out", self.folder / "curves.pdf")
         self.assertFalse((self.folder / "curves.png").exists())
 
-    def test_a_picture_is_vector_graphics_where_its_name_says_so(self):
+    def test_the_file_extension_selects_vector_graphics(self):
         curves = self.folder / "curves.svg"
         result = run("plot", self.run_folder("a", 1, [1, 2]), "--metrics", "update", "--out", curves)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
@@ -89,7 +89,7 @@ class Plots(CommandCase):
         result = run("plot", self.run_folder("a", 1, [1, 2]), "--metrics", "update", "--out", "curves.png", cwd=self.folder)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
 
-    def test_without_matplotlib_or_python_plots_say_what_to_install(self):
+    def test_plots_without_matplotlib_or_python_print_what_to_install(self):
         curves = self.folder / "curves.png"
         arguments = ["plot", self.run_folder("a", 1, [1, 2]), "--metrics", "goals_per_1000_steps", "--out", curves]
         result = run(*arguments, PICTURA_PYTHON=self.python_without_matplotlib())
@@ -106,7 +106,7 @@ class Plots(CommandCase):
         self.assertEqual((result.returncode, "was ended by signal 9" in result.stderr), (1, True), result.stderr)
         self.assertFalse(curves.exists())
 
-    def test_an_interrupt_ends_the_python_too(self):
+    def test_an_interrupt_ends_the_python_process(self):
         running = self.folder / "running"
         python = self.python_as(f"echo $$ > {running}; exec sleep 60")
         command = [PICTURA, "plot", self.run_folder("a", 1, [1]), "--out", self.folder / "curves.png"]

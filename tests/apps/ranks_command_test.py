@@ -85,13 +85,13 @@ class Ranks(CommandCase):
                 self.assertAlmostEqual(value, other_value, delta=1e-3 * largest + 2e-6, msg=name)
         self.assertGreater(moved, 1e-4)
 
-    def test_two_train_as_one_does(self):
+    def test_two_ranks_train_as_one_does(self):
         self.assert_two_train_as_one()
 
-    def test_two_that_hold_actions_train_as_one_does(self):
+    def test_two_ranks_with_held_actions_train_as_one_does(self):
         self.assert_two_train_as_one("--set", "policy.decision_steps=2")
 
-    def test_two_that_train_among_opponents_train_as_one_does(self):
+    def test_two_ranks_with_opponents_train_as_one_does(self):
         opponent = CONFIGS.parent / "models/vector.safetensors"
         self.assert_two_train_as_one("--set", f'simulator.others.policies=["{opponent}=0.3"]')
 
@@ -116,7 +116,7 @@ class Ranks(CommandCase):
                 continue
             self.assertAlmostEqual(float(value), float(other), delta=1e-3 * abs(float(value)) + 1e-5, msg=name)
 
-    def test_any_number_of_ranks_goes_on_from_a_checkpoint(self):
+    def test_any_number_of_ranks_resumes_from_a_checkpoint(self):
         updates = lambda n: ["--set", f"train.updates={n}", *self.GRADIENTS]
         for saved_by, run in ((2, "two"), (1, "one")):
             self.train(saved_by, *self.SETTINGS, *updates(2), "--out", self.folder / run)
@@ -132,7 +132,7 @@ class Ranks(CommandCase):
                     self.folder / f"{run}-1/checkpoint.ckpt", self.folder / f"{run}-{size}/checkpoint.ckpt", start
                 )
 
-    def test_they_resume_exactly_in_sets_of_recorded_scenes(self):
+    def test_ranks_resume_exactly_in_sets_of_recorded_scenes(self):
         scenes = self.folder / "scenes"
         scenes.mkdir()
         for number in (1, 2, 3):
@@ -165,7 +165,7 @@ class Ranks(CommandCase):
             time.sleep(0.05)
         return processes
 
-    def test_a_rank_that_is_killed_or_stopped_ends_the_others_by_name(self):
+    def test_a_killed_or_stopped_rank_is_named_and_ends_the_others(self):
         def end(victim, how):
             out = self.folder / f"{victim}-{how}"
             processes = self.long_run(out)
@@ -188,7 +188,7 @@ class Ranks(CommandCase):
             for case in [pool.submit(end, *each) for each in cases]:
                 case.result()
 
-    def test_a_request_to_end_that_one_gets_ends_both_after_the_same_update(self):
+    def test_a_signal_to_one_rank_ends_both_after_the_same_update(self):
         for asked in (0, 1):
             out = self.folder / f"run{asked}"
             processes = self.long_run(out)
@@ -201,7 +201,7 @@ class Ranks(CommandCase):
             )  # fmt: skip
             self.assertEqual(report["updates"], updates + 1)
 
-    def test_ranks_that_disagree_are_refused_by_key(self):
+    def test_errors_name_keys_that_differ_between_ranks(self):
         other = lambda rank: ["--set", f"train.learning_rate={0.001 * (rank + 1)}"]
         for status, _, err in self.finish(self.start(2, *self.SETTINGS, "--out", self.folder / "run", of_rank=other)):
             self.assertEqual(status, 1)
@@ -213,7 +213,7 @@ class Ranks(CommandCase):
             self.assertEqual(status, 1)
             self.assertIn("ranks 0 and 1 have different settings: old_run", err)
 
-    def test_bad_input_is_refused_by_name(self):
+    def test_errors_name_bad_input(self):
         with socket.create_server(("0.0.0.0", 0)) as server:
             port = server.getsockname()[1]
             first = self.start(2, *self.SETTINGS, "--out", self.folder / "run", port=port)

@@ -11,7 +11,7 @@ SCENES = pathlib.Path(__file__).resolve().parents[1] / "golden"
 
 
 class Images(CommandCase):
-    def test_images_are_written_and_hash_alike_for_any_number_of_threads(self):
+    def test_image_hashes_do_not_depend_on_the_number_of_threads(self):
         town = self.town()
         hashes = set()
         for threads in (1, 2, 3):
@@ -26,7 +26,7 @@ class Images(CommandCase):
         self.assertEqual(len(hashes), 1)
         self.assertRegex(hashes.pop(), "^[0-9a-f]{16}$")
 
-    def test_drawing_ends_soon_after_an_interrupt_that_came_before_it(self):
+    def test_drawing_ends_soon_after_an_earlier_interrupt(self):
         out = self.folder / "images"
         arguments = ["render", str(self.town()), "--agents", "30", "--steps", "0", "--views", "30", "--size", "384x216", "--out", str(out)]
         with subprocess.Popen([PICTURA, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -35,7 +35,7 @@ class Images(CommandCase):
             self.assertIn("error: ", process.communicate()[1])
         self.assertEqual((process.returncode, list(out.iterdir())), (130, []))
 
-    def test_a_used_folder_keeps_no_pictures_of_before(self):
+    def test_earlier_pictures_are_removed_from_the_folder(self):
         out = self.folder / "images"
         render = ["render", "procedural:1", "--agents", 6, "--steps", 0, "--backend", "null", "--size", "16x9", "--out", out]
         self.json_of(*render, "--views", 4, "--figure")
@@ -57,7 +57,7 @@ class Images(CommandCase):
         names += [f"{view}.png" for view in views] + ["figure.png", "contact_sheet.png"]
         self.assertEqual(sorted(path.name for path in out.glob("[!.]*")), sorted(names))
 
-    def test_bad_scene_files_are_refused_with_their_line(self):
+    def test_errors_name_the_line_of_bad_scene_files(self):
         text = (SCENES / "vehicles.toml").read_text().replace('rig = "rigs/front.toml"', "size_px = [8, 8]")
         bad = self.folder / "bad.toml"
         render = ["render", bad, "--backend", "cpu", "--out", self.folder / "images"]
@@ -67,7 +67,7 @@ class Images(CommandCase):
         self.assert_refused(2, "--agents: has no effect on a scene file", *render, "--agents", 4)
         self.assert_refused(2, "colour", *render, "--planes", "colour")
 
-    def test_bad_arguments_are_refused_by_name(self):
+    def test_errors_name_bad_arguments(self):
         town = self.town()
         render = ["render", town, "--out", self.folder / "images"]
         self.assert_refused(2, "0x0", *render, "--size", "0x0")

@@ -21,7 +21,7 @@ class Replays(CommandCase):
 
     WORLD = ["procedural:1:blocks=2x2", "--agents", 12, "--seed", 4]
 
-    def test_simulate_records_what_it_counts_and_drives_alike(self):
+    def test_recorded_metrics_and_state_equal_the_simulations(self):
         path = self.folder / "a.html"
         simulate = ["simulate", *self.WORLD, "--steps", 60, "--policy", "random"]
         facts = self.json_of(*simulate, "--replay", path, "--follow", 3, started=True)
@@ -59,7 +59,7 @@ class Replays(CommandCase):
         self.assert_refused(2, "--cameras: has no effect without --replay", "simulate", *self.WORLD, "--cameras")
         self.assertEqual(list(self.folder.iterdir()), [])
 
-    def test_a_gallery_takes_the_place_of_an_earlier_one(self):
+    def test_a_gallery_replaces_an_earlier_one(self):
         folder = self.folder / "gallery"
         replay = ["replay", "procedural:1:blocks=2x2", "--agents", 4, "--steps", 10]
         self.json_of(*replay, "--gallery", folder, "--episodes", 3)
@@ -67,7 +67,7 @@ class Replays(CommandCase):
         self.json_of(*replay, "--gallery", folder, "--episodes", 2, "--seed", 7)
         self.assertEqual(sorted(path.name for path in folder.glob("[!.]*")), ["index.html", "mine.html", "seed_7.html", "seed_8.html"])
 
-    def test_the_worst_scenarios_of_an_evaluation_are_driven_again(self):
+    def test_worst_scenarios_of_an_evaluation_are_recorded(self):
         if not has_torch():
             self.skipTest("this build has no torch")
         evaluate = ["evaluate", "--policy", "random", "--map", "procedural:1:blocks=2x2,procedural:2:blocks=2x2", "--agents", 10,
@@ -90,7 +90,7 @@ class Replays(CommandCase):
         self.assert_refused(2, "--gallery", *evaluate, "--replays", 2)
         self.assert_refused(2, "--follow: has no effect without --replay", *evaluate, "--follow", 1)
 
-    def test_a_probes_case_is_driven_again_with_its_road_user(self):
+    def test_a_probe_case_is_recorded_with_its_road_user(self):
         if not has_torch():
             self.skipTest("this build has no torch")
         policies = []
@@ -161,7 +161,7 @@ class Replays(CommandCase):
         self.assert_refused(2, "--case: expected 0 to 0, got 1", *corner, *out, "--case", 1)
         self.assert_refused(2, "--case: expected 0 to 79, got 80", "probe", "removal", *world, "--removals", 80, "--replay", path, "--case", 80)
 
-    def test_a_policys_decisions_are_those_that_it_drives_by(self):
+    def test_recorded_decisions_match_the_driven_actions(self):
         if not has_torch():
             self.skipTest("this build has no torch")
         self.json_of("train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run")

@@ -29,14 +29,14 @@ class Simulation(CommandCase):
         self.assertNotEqual(hashes[1], hashes[2])
         self.assertRegex(run("simulate", town, "--agents", 5, "--steps", 40).stderr, r"step 40/40  ETA 0 s\n$")
 
-    def test_a_world_that_is_too_small_says_what_it_refused(self):
+    def test_a_small_world_reports_refused_agents(self):
         result = self.json_of("simulate", self.town(blocks="1x1"), "--agents", 1024, "--steps", 5, "--policy", "idle")
         self.assertEqual(result["asked"], 1024)
         self.assertEqual(result["spawned"] + result["refused"], 1024)
         self.assertGreater(result["refused"], 0)
 
     @unittest.skipUnless(TOWNS, "no towns: set PICTURA_DATA")
-    def test_every_town_takes_a_thousand_agents_or_says_why_not(self):
+    def test_every_town_spawns_1024_agents_or_reports_refusals(self):
         for town in TOWNS:
             with self.subTest(town):
                 result = self.json_of("simulate", town, "--agents", 1024, "--steps", 2, "--policy", "idle")
@@ -47,7 +47,7 @@ class Simulation(CommandCase):
                 self.assertGreater(result["vehicles"], 2 * result["cyclists"])
                 self.assertGreater(result["pedestrians"], 0)
 
-    def test_the_population_is_what_is_asked_for(self):
+    def test_the_population_has_the_requested_shares(self):
         town = self.town()
         result = self.json_of("simulate", town, "--agents", 40, "--steps", 1, "--pedestrians", 0, "--cyclists", 1, "--parked", 3)
         self.assertEqual((result["vehicles"], result["cyclists"], result["pedestrians"]), (0, result["spawned"], 0))
@@ -57,7 +57,7 @@ class Simulation(CommandCase):
         self.assert_refused(2, "--parked", "simulate", town, "--parked", -1)
 
     @needs_ffmpeg
-    def test_a_film_that_is_interrupted_before_its_first_frame_has_the_status_of_the_signal(self):
+    def test_a_film_interrupted_before_its_first_frame_exits_with_the_signals_status(self):
         video = self.folder / "film.mp4"
         # Served worlds wait for a page.
         arguments = ["simulate", "procedural:1", "--agents", "4", "--serve", "--video", str(video)]
@@ -77,7 +77,7 @@ class Simulation(CommandCase):
         self.assert_refused(2, "--film-agent", *film, "--film-agent", 5)
         self.assert_refused(2, "--film-width", *film, "--film-width", -1)
 
-    def test_bad_arguments_are_refused_by_name(self):
+    def test_errors_name_bad_arguments(self):
         simulate = ["simulate", self.town()]
         self.assert_refused(2, "--agents", *simulate, "--agents", 0)
         self.assert_refused(2, "100000000", *simulate, "--agents", 100_000_000)

@@ -59,7 +59,7 @@ class Training(CommandCase):
         for name in ("checkpoint.ckpt", "untrained.ckpt", "policy.safetensors", "progress.csv"):
             self.assertTrue((self.folder / "whole" / name).exists(), name)
 
-    def test_a_folder_with_a_run_asks_what_to_do_with_it(self):
+    def test_an_existing_run_requires_resume_or_overwrite(self):
         one = ["train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run"]
         first = self.json_of(*one)
         self.assert_refused(1, f"{self.folder}/run: already holds a run (checkpoint.ckpt, ", *one)
@@ -67,7 +67,7 @@ class Training(CommandCase):
         self.assert_refused(2, "excludes", *one, "--overwrite", "--resume")
         self.assertEqual(self.json_of(*one, "--overwrite")["policy_hash"], first["policy_hash"])
 
-    def test_bad_input_is_refused_by_name(self):
+    def test_errors_name_bad_input(self):
         out = ["--out", self.folder / "run"]
         self.assert_refused(1, "train.speed", "train", *TINY, "--set", "train.speed=3", *out)
         self.assert_refused(1, "simulator.num_slots", "train", *TINY, "--set", "simulator.num_slots=0", *out)
@@ -112,7 +112,7 @@ class Training(CommandCase):
         self.json_of(*evaluate, "--renderer", "cpu", "--simulator", "cpu", "--device", "cpu")
         self.assert_refused(1, on_host, *evaluate, "--device", "cuda")
 
-    def test_training_on_a_device_says_so(self):
+    def test_training_prints_its_device(self):
         if os.environ.get("PICTURA_REQUIRE_GPU") != "1":
             self.skipTest("PICTURA_REQUIRE_GPU is not 1")
         out = self.folder / "run"
@@ -122,7 +122,7 @@ class Training(CommandCase):
                             "--steps", 40, "--device", "cuda")["rows"]  # fmt: skip
         self.assertGreater(rows[0]["km_driven"], 0)
 
-    def test_minutes_end_a_run_that_can_go_on(self):
+    def test_a_run_ended_by_its_time_limit_can_be_resumed(self):
         train = ["train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run"]
         self.assert_refused(2, "--minutes", *train, "--minutes", 0)
         stopped = self.json_of(*train, "--minutes", 1e-9)
@@ -134,7 +134,7 @@ class Training(CommandCase):
 class Signals(CommandCase):
     """Signals that end training and other commands."""
 
-    def test_an_interrupt_leaves_a_checkpoint_to_go_on_from(self):
+    def test_an_interrupted_run_can_be_resumed(self):
         out = self.folder / "run"
         arguments = [PICTURA, "train", *TINY, "--set", "train.updates=100000", "--set", "train.checkpoint_every=1"]
         process = subprocess.Popen([*arguments, "--out", str(out)], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -167,7 +167,7 @@ class Signals(CommandCase):
         while not is_there() and time.monotonic() < deadline:
             time.sleep(0.02)
 
-    def test_each_signal_saves_what_there_is_and_has_its_status(self):
+    def test_each_signal_saves_the_run_and_exits_with_its_status(self):
         for name, status in [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)]:
             with self.subTest(name):
                 out = self.folder / name
@@ -181,7 +181,7 @@ class Signals(CommandCase):
                 result = run(*self.LONG, "--out", out, "--resume", "--minutes", 0.0001, "--json")
                 self.assertEqual(json.loads(result.stdout)["updates"], 0, result.stderr)
 
-    def test_other_commands_have_the_statuses_of_signals_too(self):
+    def test_other_commands_exit_with_the_statuses_of_signals(self):
         for name, status in [("SIGTERM", 143), ("SIGHUP", 129)]:
             process = subprocess.Popen([PICTURA, "simulate", "procedural:1", "--agents", "8", "--steps", "10000000"],
                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip
@@ -191,7 +191,7 @@ class Signals(CommandCase):
             _, errors = process.communicate(timeout=120)
             self.assertEqual((process.returncode, "error: interrupted at step" in errors), (status, True), errors)
 
-    def test_a_second_signal_ends_it_at_once_unless_it_is_the_first_sent_twice(self):
+    def test_a_second_signal_ends_a_run_at_once_except_a_duplicate(self):
         out = self.folder / "impatient"
         process = self.start(*self.LONG_UPDATES, "--out", out, until=out / "untrained.ckpt")
         time.sleep(2)
@@ -213,7 +213,7 @@ class Signals(CommandCase):
         process.communicate(timeout=120)
         self.assertEqual((process.returncode, (out / "checkpoint.ckpt").exists()), (143, True))
 
-    def test_a_run_loses_nothing_by_a_stderr_that_takes_nothing(self):
+    def test_a_run_is_complete_without_a_writable_stderr(self):
         train = [PICTURA, "train", *TINY, "--set", "train.updates=2", "--out"]
         reader, closed_pipe = os.pipe()
         os.close(reader)
@@ -230,7 +230,7 @@ class Signals(CommandCase):
                     rows = list(csv.DictReader((out / "progress.csv").read_text().splitlines()))
                     self.assertEqual([row["update"] for row in rows], ["1", "2"])
 
-    def test_a_terminal_that_hangs_up_takes_nothing_with_it(self):
+    def test_a_run_is_saved_when_its_terminal_hangs_up(self):
         out = self.folder / "run"
         child, terminal = pty.fork()
         if child == 0:
@@ -240,7 +240,7 @@ class Signals(CommandCase):
         self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), 129)
         self.assertTrue((out / "policy.safetensors").exists())
 
-    def test_under_nohup_a_hang_up_changes_nothing(self):
+    def test_nohup_ignores_a_hang_up(self):
         out = self.folder / "run"
         process = self.start(*self.LONG, "--out", out, until=out / "untrained.ckpt",
                              preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))  # fmt: skip

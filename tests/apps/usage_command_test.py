@@ -13,7 +13,7 @@ from command_case import CONFIGS, PICTURA, CommandCase, has_torch, needs_ffmpeg,
 
 
 class Usage(CommandCase):
-    def test_help_teaches_by_example(self):
+    def test_help_has_examples(self):
         for command in ["town", "map", "render", "simulate", "replay", "plot", "bench", *(["train", "evaluate", "probe"] if has_torch() else [])]:
             result = run(command, "--help")
             self.assertEqual(result.returncode, 0, result.stderr)
@@ -59,7 +59,7 @@ class Typing(CommandCase):
             self.assert_refused(2, f"--seed: expected a whole number of 0 to 18446744073709551615, got '{seed}'",
                                 "town", "--out", self.folder / "town.xodr", "--seed", seed)  # fmt: skip
 
-    def test_every_option_that_takes_a_number_reads_it_alike(self):
+    def test_all_options_read_numbers_alike(self):
         for command in self.COMMANDS:
             page = run(*command, "--help")
             if page.returncode != 0:
@@ -72,7 +72,7 @@ class Typing(CommandCase):
                     count = 4 if option == "--box" else 1
                     self.assert_refused(2, "number", *command, option, *["0x1"] * count)
 
-    def test_one_bound_on_threads(self):
+    def test_all_commands_limit_threads_to_1024(self):
         commands = [("render", "procedural:1", "--out", self.folder), ("simulate", "procedural:1")]
         if has_torch():
             commands.append(("evaluate", "no.ckpt"))
@@ -97,7 +97,7 @@ class Typing(CommandCase):
         else:
             self.assert_refused(2, "pictura train: this build has no torch: pip install 'pictura[train]'", "train", "--config", "a.toml")
 
-    def test_values_that_would_be_ignored_are_refused(self):
+    def test_values_without_effect_are_refused(self):
         town = self.town(blocks="1x1")
         self.assert_refused(2, "--png: expected a value, got an empty text", "map", town, "--png", "")
         self.assert_refused(2, "--at: has no effect without --png or --svg", "map", town, "--at", 0, 0)
@@ -107,11 +107,11 @@ class Typing(CommandCase):
         self.assert_refused(2, "--film-width: has no effect without --video", "simulate", town, "--film-width", 9)
         self.assert_refused(2, "expected at most 1 together", "simulate", town, "--pedestrians", 1, "--cyclists", 1)
 
-    def test_a_share_that_was_not_given_gives_way(self):
+    def test_a_given_share_reduces_default_shares(self):
         facts = self.json_of("simulate", self.town(), "--agents", 6, "--steps", 1, "--pedestrians", 1)
         self.assertEqual((facts["vehicles"], facts["cyclists"]), (0, 0))
 
-    def test_messages_are_one_line_whatever_a_name_holds(self):
+    def test_messages_are_one_line_for_any_name(self):
         self.assert_refused(2, "map 'a\\nb\\x1b': expected", "map", "a\nb\x1b")
         if has_torch():
             self.assert_refused(1, "no.toml: no such file", "train", "--config", "no.toml", "--out", self.folder / "run")
@@ -120,7 +120,7 @@ class Typing(CommandCase):
 class Files(CommandCase):
     """Effects of output files on existing files, and errors for a full disk and a closed end."""
 
-    def test_devices_links_and_fifos_stay_what_they_are(self):
+    def test_outputs_do_not_replace_devices_links_and_fifos(self):
         town, link, fifo = self.town(blocks="1x1"), self.folder / "link", self.folder / "fifo"
         self.assert_refused(1, "/dev/full: cannot be written: No space left on device", "map", town, "--png", "/dev/full")
         self.assertTrue(pathlib.Path("/dev/full").is_char_device())
@@ -135,7 +135,7 @@ class Files(CommandCase):
         self.assertTrue(fifo.is_fifo())
         self.assert_refused(1, "expected a file, got a folder", "map", town, "--png", self.folder)
 
-    def test_names_of_descriptors_are_written_where_they_are(self):
+    def test_output_to_descriptor_paths_continues_at_the_offset(self):
         expected = self.town(blocks="1x1").read_text()
         town = [PICTURA, "town", "--seed", "3", "--blocks", "1x1", "--out"]
         for name in ("/dev/stdout", "/proc/self/fd/1", "/dev/fd/1"):
@@ -156,7 +156,7 @@ class Files(CommandCase):
                 subprocess.run([*town, "/dev/stdout"], stdout=writing, check=True, timeout=60)
             self.assertTrue(text.read().startswith(expected))
 
-    def test_every_byte_of_stdout_counts(self):
+    def test_an_incomplete_stdout_is_an_error(self):
         town = self.town()
         listing = [PICTURA, "map", str(town), "--full", "--json"]
         self.assertGreater(len(subprocess.run(listing, capture_output=True).stdout), 1 << 16)
@@ -171,7 +171,7 @@ class Files(CommandCase):
                 self.assertEqual((result.returncode, "No space left on device" in result.stderr), (1, True), result.stderr)
 
     @needs_ffmpeg
-    def test_closed_descriptors_are_no_outputs(self):
+    def test_output_files_do_not_reuse_closed_standard_descriptors(self):
         for closed in ([2], [0, 1, 2]):
             with self.subTest(closed=closed):
                 video = self.folder / "film.mp4"
@@ -181,7 +181,7 @@ class Files(CommandCase):
                 self.assertEqual(result.returncode, 1 if 1 in closed else 0)
                 self.assertEqual(video.read_bytes()[4:8], b"ftyp")
 
-    def test_what_stderr_does_not_take_is_lost_and_nothing_else(self):
+    def test_an_unwritable_stderr_does_not_affect_results(self):
         reader, closed_pipe = os.pipe()
         os.close(reader)
         self.addCleanup(os.close, closed_pipe)
@@ -193,7 +193,7 @@ class Files(CommandCase):
                 self.assertEqual((result.returncode, json.loads(result.stdout)["steps"]), (0, 20))
                 self.assertTrue(page.exists())
 
-    def test_a_closed_stdout_is_an_error_after_the_work_is_saved(self):
+    def test_a_closed_stdout_is_an_error_after_files_are_saved(self):
         reader, closed_pipe = os.pipe()
         os.close(reader)
         self.addCleanup(os.close, closed_pipe)
@@ -204,7 +204,7 @@ class Files(CommandCase):
             self.assertEqual((result.returncode, town.exists()), (1, True), result.stderr)
             self.assertIn("error: stdout: cannot be written: Broken pipe", result.stderr)
 
-    def test_no_two_options_write_one_file(self):
+    def test_two_options_cannot_write_one_file(self):
         town, page = self.town(blocks="1x1"), self.folder / "page"
         for first, second in [("--replay", "--mcap"), ("--mcap", "--scene"), ("--policy", "--replay")]:
             with self.subTest(first=first, second=second):
