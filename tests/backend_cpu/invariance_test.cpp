@@ -61,7 +61,7 @@ TEST(Invariance, AWallInFrontHidesAnAgentToTheLastBit) {
 }
 
 /// Far cars behind a wall of many pieces: slivers of the cars lie in pixels that one piece or two pieces together fill.
-TEST(Invariance, WhatIsHiddenBehindPiecesOfAWallLeavesNoSliver) {
+TEST(Invariance, ObjectsBehindPiecesOfAWallAreInvisible) {
   std::vector<AgentBox> hidden;
   for (int i = 0; i < 40; ++i) {
     const auto at = static_cast<float>(i);
@@ -266,7 +266,7 @@ TEST(Invariance, TheFacesOfABoxSumToItsSilhouette) {
   }
 }
 
-TEST(Invariance, TwoPiecesOfALineCoverWhatTheWholeLineDoes) {
+TEST(Invariance, TwoPiecesOfALineCoverAsMuchAsTheWholeLine) {
   // Each piece has one brightness, so the line lies across the view, at one depth.
   for (const float tilt : {0.0f, 0.05f}) {
     const Vec3 a{20, 8, 0}, b{20, -6, tilt * 14};

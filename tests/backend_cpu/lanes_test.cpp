@@ -234,7 +234,7 @@ std::vector<uint32_t> bits_of_strip(const ScreenQuad& quad, const FacePlane& pla
   return bits;
 }
 
-TEST(Lanes, SetStripsUpAsOne) {
+TEST(Lanes, SetUpStripsAsTheScalarCodeDoes) {
   const Snapshot snapshot = drive_snapshot({.map = "procedural:1", .views = 8});
   const StaticGeometryView pieces = snapshot.geometry.view();
   const CulledGeometry culled(pieces);

@@ -26,7 +26,7 @@ TEST(Quality, TownsAreWithinThePromisedError) {
   }
 }
 
-TEST(Quality, OddSizesAndMixedRigsToo) {
+TEST(Quality, OddSizesAndMixedRigsAreWithinThePromisedError) {
   Snapshot town = make_synthetic_town(5, 60);
   town.views.resize(2);
   RendererConfig config{.rig = paper_rig(97, 55), .num_threads = 1};

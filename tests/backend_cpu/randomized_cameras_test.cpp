@@ -38,7 +38,7 @@ RendererConfig randomized(const CameraRandomization& ranges, const Rig& rig = pa
   return {.rig = rig, .num_threads = 1, .randomization = ranges};
 }
 
-TEST(RandomizedImages, KeysAloneChangeNoImage) {
+TEST(RandomizedImages, ViewKeysChangeNoImageWithoutRandomization) {
   const Snapshot town = town_with_views(3);
   std::vector<View> unkeyed = town.views;
   for (View& view : unkeyed) view.key = {};
@@ -46,7 +46,7 @@ TEST(RandomizedImages, KeysAloneChangeNoImage) {
 }
 
 // Shifts and focal lengths are exact; angles are turned in float, those of rigs in double.
-TEST(RandomizedImages, AreThoseOfARigMountedSo) {
+TEST(RandomizedImages, EqualImagesOfARigWithTheDrawnMounting) {
   const Snapshot town = town_with_views(1);
   const CameraRandomization moved{.seed = 9, .shift_m = 0.3, .focal_share = 0.2};
   Rig rig = paper_rig();
@@ -61,7 +61,7 @@ TEST(RandomizedImages, AreThoseOfARigMountedSo) {
   EXPECT_NE(drawn(town, town.views, randomized(moved)), drawn(town, town.views, randomized({})));
 }
 
-TEST(RandomizedImages, TurnAsTheirAnglesSay) {
+TEST(RandomizedImages, EqualImagesOfARigWithTheDrawnAngles) {
   const Snapshot town = town_with_views(1);
   const CameraRandomization turned{.rotation_deg = 8};
   Rig rig = front_rig(), expected_rig = rig;
@@ -77,7 +77,7 @@ TEST(RandomizedImages, TurnAsTheirAnglesSay) {
 }
 
 // Minibatches and films redraw earlier views from a history: other views, in another order.
-TEST(RandomizedImages, AreDrawnAgainFromAHistory) {
+TEST(RandomizedImages, AreReproducedFromAHistory) {
   const Snapshot town = town_with_views(4);
   const std::size_t agents = town.scene.agents.size(), lights = town.scene.light_states.size();
   const auto history = make_host_scene_history(
@@ -101,7 +101,7 @@ TEST(RandomizedImages, AreDrawnAgainFromAHistory) {
   EXPECT_TRUE(std::equal(images.bytes().begin() + bytes, images.bytes().end(), first.begin() + bytes));
 }
 
-TEST(RandomizedImages, HaveTheEffectOfTheirPixels) {
+TEST(RandomizedImages, ApplyBrightnessAndNoiseToEachPixel) {
   const Snapshot town = town_with_views(1);
   const CameraRandomization ranges{.seed = 4, .brightness_share = 0.5, .noise_share = 0.2};
   const Rig rig = front_rig(13, 7);  // patches extend beyond this image
@@ -130,7 +130,7 @@ TEST(RandomizedImages, HaveTheEffectOfTheirPixels) {
   EXPECT_EQ(patches.size() - static_cast<std::size_t>(std::ranges::count(patches, uint8_t{0})), lit);
 }
 
-TEST(RandomizedImages, OfDeadCamerasAreBlackAndTheirPlanesAreNot) {
+TEST(RandomizedImages, DeadCamerasHaveBlackImagesAndValidPlanes) {
   const Snapshot town = town_with_views(1);
   const RendererConfig config = randomized({.noise_share = 0.1, .dead_probability = 1});
   const auto renderer = make_renderer("cpu", config);

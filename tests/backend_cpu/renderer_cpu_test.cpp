@@ -122,7 +122,7 @@ TEST(CpuRenderer, TheFloorIsMeasuredAcrossTheStripOnScreen) {
   EXPECT_NEAR(covered, 0.35f, 1e-3);
 }
 
-TEST(CpuRenderer, StripsAreClippedWhereTheyCrossTheNearPlaneNotTheirCentreLines) {
+TEST(CpuRenderer, StripsAreClippedWhereTheirBordersCrossTheNearPlane) {
   // An eye 3 cm above a mark 2 m wide that passes the eye at 45 degrees. The mark's centre line crosses the near plane
   // 1.1 m to the left. Straight ahead the mark reaches from behind the near plane, 15 px below the centre, to 0.41 m
   // ahead.
@@ -140,7 +140,7 @@ TEST(CpuRenderer, StripsAreClippedWhereTheyCrossTheNearPlaneNotTheirCentreLines)
   }
 }
 
-TEST(CpuRenderer, WideningAnEndFarAwayLeavesAStripAsItIsWhereItCrossesTheNearPlane) {
+TEST(CpuRenderer, WideningAFarEndDoesNotChangeAStripAtTheNearPlane) {
   // An eye 3 cm above a mark that passes the eye at 38 degrees, looking down. The mark's end ahead, 4 m away, is
   // widened by 0.4 px on either side. If the mark moved as a whole, its sides near the camera would rise by half of the
   // eye's height.
@@ -356,7 +356,7 @@ float from_half(uint16_t bits) {
                        : std::ldexp(static_cast<float>(1024 + mantissa), exponent - 25);
 }
 
-TEST(CpuRenderer, HalvesAndBytesAreTheFloatsRounded) {
+TEST(CpuRenderer, HalvesAndBytesAreRoundedFloats) {
   for (int bits = 0; bits <= 0x3C00; ++bits) {
     const float value = from_half(static_cast<uint16_t>(bits));
     ASSERT_EQ(to_half(value), bits);
@@ -462,7 +462,7 @@ TEST(CpuRenderer, KeepsMapsByHandle) {
 
 TEST(CpuRenderer, DrawsPatches) { test::expect_patches(make_cpu); }
 
-TEST(CpuRenderer, DrawsAsManyViewsAsItsCountSays) {
+TEST(CpuRenderer, DrawsTheCountedViews) {
   test::expect_counted_views(make_cpu);
   test::expect_counted_queries(make_cpu);
 }
@@ -485,7 +485,7 @@ class CpuRendererErrors : public testing::Test {
   HostImages images_{paper_rig(8, 8), 1};
 };
 
-TEST_F(CpuRendererErrors, GoodInputIsFine) {
+TEST_F(CpuRendererErrors, ValidInputIsAccepted) {
   EXPECT_NO_THROW(renderer_->render(scene_.batch(), views_, images_.batch()));
   HostImages none(paper_rig(8, 8), 0);
   EXPECT_NO_THROW(renderer_->render({}, {}, none.batch()));
@@ -557,7 +557,7 @@ TEST_F(CpuRendererErrors, QueriesAndGeometryAndConfig) {
   EXPECT_THROW(make_renderer("cpu", {.rig = paper_rig(8, 8), .line_floor_px = -1}), Error);
   EXPECT_THROW(make_renderer("cpu", {.rig = {}}), Error);
 }
-TEST_F(CpuRendererErrors, GeometryThatIsFaulty) {
+TEST_F(CpuRendererErrors, InvalidGeometry) {
   StaticGeometry sound = no_geometry();
   sound.strips.push_back({{0, 0, 0}, {1, 0, 0}, {0, 1}, {0, 1}, 0.2f, kWhiteMarkColor});
   sound.walls.push_back({{0, 0, 0}, {1, 0, 0}, 2.0f});
@@ -591,7 +591,7 @@ TEST_F(CpuRendererErrors, GeometryThatIsFaulty) {
 }
 
 // A widened strip may cover pixels at which the strip's plane is behind the camera.
-TEST(CpuRenderer, AWidenedStripIsInThePlanesWhereItsColourIs) {
+TEST(CpuRenderer, AWidenedStripCoversEqualPixelsInPlanesAndImage) {
   Snapshot town;
   Strip strip = {{60, -6, 1.4999f}, {62, 6, 1.49f}, {0.98f, -0.16f}, {0.98f, -0.16f}, 0.15f, kWhiteMarkColor};
   town.geometry.strips.push_back(strip);

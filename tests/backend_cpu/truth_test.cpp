@@ -23,7 +23,7 @@ TEST(Truth, HillsAndBridges) {
   EXPECT_GE(quality.worst_image_db, kMinImagePsnr_db);
 }
 
-TEST(Truth, OddSizesDownToOnePixelAndEightCamerasOfEightSizes) {
+TEST(Truth, OddSizesAndEightCamerasOfEightSizes) {
   const Snapshot town = make_hill();
   EXPECT_GE(quality_of(town, paper_rig(97, 55)).oracle.psnr_db(), kMinOraclePsnr_db);
   // All objects share the single pixel.
@@ -91,7 +91,7 @@ TEST(Truth, PlanesShowTheSameSurfaces) {
   }
 }
 
-TEST(Truth, NoSolidIsInFrontOfTheWrongOne) {
+TEST(Truth, SolidsAreInDepthOrder) {
   // Footprints are disjoint: every pixel centre that is not on an edge must show the truth's solid.
   for (const uint64_t seed : {21, 22, 23}) {
     Snapshot town = make_synthetic_town(seed, 150);
@@ -113,7 +113,7 @@ TEST(Truth, IntersectingBoxesAreDividedWhereTheyMeet) {
   EXPECT_LE(static_cast<double>(difference.instances), kPlaneShare * static_cast<double>(difference.pixels));
 }
 
-TEST(Truth, VisibilityAgrees) {
+TEST(Truth, VisibilityMatchesTheTruth) {
   Snapshot town = make_synthetic_town(13, 120);
   town.views.resize(2);
   const Snapshot scenes[] = {town, make_hill()};
@@ -172,7 +172,7 @@ std::vector<float> drawn_down(const Snapshot& town, Camera camera, int factor, f
   return small;
 }
 
-TEST(Truth, WithoutAFloorALargerImageAveragedDownIsTheSmallOne) {
+TEST(Truth, WithoutALineFloorAveragedLargeImagesEqualSmallOnes) {
   Snapshot town = make_hill();
   town.views.resize(1);
   const Camera camera = paper_rig().cameras[0];

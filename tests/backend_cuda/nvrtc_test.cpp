@@ -66,7 +66,7 @@ INSTANTIATE_TEST_SUITE_P(All, NvrtcHeader, testing::ValuesIn(shared_headers()), 
   return name;
 });
 
-TEST(Nvrtc, AHeaderOfTheStandardLibraryIsAFault) {
+TEST(Nvrtc, RefusesHeadersOfTheStandardLibrary) {
   EXPECT_NE(compile("#include <vector>\n__global__ void kernel() {}\n", "sm_90"), "");
 }
 

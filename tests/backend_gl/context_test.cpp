@@ -49,7 +49,7 @@ void expect_left_current(gl::Context* outer, const char* file, const char* packa
   EXPECT_EQ(current(), before);
 }
 
-TEST(GlContext, LeavesTheThreadAsItFoundIt) {
+TEST(GlContext, RestoresThePreviousContextAndApi) {
   const std::string no_osmesa = missing("gl:osmesa"), no_egl = missing("gl:egl");
   if (no_osmesa.empty()) {
     expect_left_current<void*>(make_osmesa_context().get(), "libOSMesa.so.8", "libosmesa6", "OSMesaGetCurrentContext",

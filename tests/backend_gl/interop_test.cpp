@@ -40,7 +40,7 @@ struct DeviceImages {
   }
 };
 
-TEST_F(GlInterop, WritesTheSameBytesToDeviceMemoryAsToTheHost) {
+TEST_F(GlInterop, WritesEqualBytesToDeviceAndHostMemory) {
   Snapshot town = make_synthetic_town(1, 120);
   town.views.resize(12);
   for (const PixelSamples samples : {PixelSamples{}, PixelSamples{.multisample = 4}, PixelSamples{.grid = 4}}) {

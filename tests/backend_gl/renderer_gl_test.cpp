@@ -45,7 +45,7 @@ Snapshot town_of(uint64_t seed, int num_views) {
   return town;
 }
 
-TEST_P(GlRenderer, DrawsWhatTheOracleDraws) {
+TEST_P(GlRenderer, MatchesTheOracle) {
   for (const uint64_t seed : {1, 2, 3}) {
     const Snapshot town = town_of(seed, 8);
     RendererConfig config{.num_threads = 1};
@@ -127,7 +127,7 @@ TEST_P(GlRenderer, RoadsOnTwoLevels) {
             kMinGlPsnr8x8_db);
 }
 
-TEST_P(GlRenderer, BoxesThatDipIntoARoadAreInFrontOfItsStrips) {
+TEST_P(GlRenderer, BoxesPartlyBelowARoadAreInFrontOfItsStrips) {
   // Upright boxes dip into roads on slopes. The strip under the car extends towards the camera.
   StaticGeometry geometry;
   add_polyline(&geometry, {{2, 0.3f, 0}, {12, 0.3f, 0}}, 0.8f, StripKind::lane_mark);
@@ -187,7 +187,7 @@ TEST_P(GlRenderer, StripsOfOneLevelAreOrderedByKindThenIndex) {
   }
 }
 
-TEST_P(GlRenderer, BatchesLargerThanAnArrayAreTheSameImages) {
+TEST_P(GlRenderer, BatchesLargerThanATextureArrayGiveTheSameImages) {
   // More images of one size than OpenGL's guaranteed layers (2048), in two cameras: arrays end within a camera's views.
   const Snapshot town = town_of(3, 16);
   RendererConfig config{.rig = paper_rig(3, 2), .num_threads = 1};
@@ -294,7 +294,7 @@ TEST_P(GlRenderer, KeepsMapsByHandle) {
   test::expect_refused_order(maker(GetParam()));
 }
 
-TEST_P(GlRenderer, DrawsAsManyViewsAsItsCountSays) { test::expect_counted_views(maker(GetParam())); }
+TEST_P(GlRenderer, DrawsTheCountedViews) { test::expect_counted_views(maker(GetParam())); }
 
 void expect_error(const std::function<void()>& call, const std::string& part) {
   try {
@@ -305,7 +305,7 @@ void expect_error(const std::function<void()>& call, const std::string& part) {
   }
 }
 
-TEST_P(GlRenderer, RejectsUnsupportedFeaturesByName) {
+TEST_P(GlRenderer, ErrorsNameUnsupportedFeatures) {
   const std::string name = GetParam();
   const Snapshot town = town_of(1, 1);
   const auto renderer = make_renderer(name, {.num_threads = 1});
@@ -337,16 +337,16 @@ TEST_P(GlRenderer, RejectsUnsupportedFeaturesByName) {
                "renderer " + name + ": only cpu and cuda support randomized brightness, noise and lost images");
 }
 
-TEST(GlNames, AnUnknownOneListsAll) {
+TEST(GlNames, AnUnknownContextNameListsAllNames) {
   expect_error([] { make_renderer("gl:glx", {}); }, "gl, gl:egl, gl:osmesa");
 }
 
-TEST(GlNames, OtherBackendsTakeNoSamples) {
+TEST(GlNames, OtherBackendsRefuseSamples) {
   expect_error([] { make_renderer("cpu", {.samples = {.grid = 4}}); },
                "renderer cpu: samples: only gl supports samples");
 }
 
-TEST(GlNames, GlSaysWhichContextItTook) {
+TEST(GlNames, GlReportsItsContext) {
   if (!missing("gl:osmesa").empty() && !missing("gl:egl").empty()) GTEST_SKIP() << "neither OSMesa nor EGL";
   std::string choice;
   const auto renderer = make_renderer("gl", {}, &choice);

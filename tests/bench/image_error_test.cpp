@@ -45,7 +45,7 @@ TEST(ImageError, EachFormatIsReadInItsOwnUnits) {
   EXPECT_EQ(error_with(PixelFormat::f16, uint16_t{0x8000}).differing, 0);           // -0
 }
 
-TEST(ImageError, UnwrittenValuesOfPatchesAreDetectedBeyondTheImageToo) {
+TEST(ImageError, UnwrittenValuesOfPatchesAreDetectedBeyondTheImage) {
   HostImages actual(kRig, 2, PixelFormat::bf16, Planes::none, ChannelOrder::patches, 12),
       expected(kRig, 2, PixelFormat::bf16, Planes::none, ChannelOrder::patches, 12);
   fill_unwritten(actual.batch());

@@ -161,7 +161,7 @@ std::vector<int64_t> same_kept(const Executors& executors, const std::vector<flo
       });
 }
 
-TEST_F(CudaLearnerTest, SelectsTheActiveSlotsThatTheMaskHas) {
+TEST_F(CudaLearnerTest, SelectsActiveSlotsInTheMask) {
   std::mt19937_64 random(1);
   const Executors executors;
   Worlds worlds(one_episode());
@@ -180,7 +180,7 @@ TEST_F(CudaLearnerTest, SelectsTheActiveSlotsThatTheMaskHas) {
   EXPECT_EQ(same_active(worlds, executors, {}).size(), 0u);
 }
 
-TEST_F(CudaLearnerTest, ChoosesTheActionsOfSomeSlots) {
+TEST_F(CudaLearnerTest, ChoosesActionsOfSelectedSlots) {
   constexpr int32_t kUntouched = -7;
   std::mt19937_64 random(2);
   const Executors executors;
@@ -215,7 +215,7 @@ TEST_F(CudaLearnerTest, ChoosesTheActionsOfSomeSlots) {
   EXPECT_GT(*std::max_element(episodes.begin(), episodes.end()), 1);
 }
 
-TEST_F(CudaLearnerTest, WritesTheCommandsThatTheMaskHas) {
+TEST_F(CudaLearnerTest, WritesCommandsInTheMask) {
   std::mt19937_64 random(3);
   const Executors executors;
   std::vector<int32_t> actions(kSlots);
@@ -309,7 +309,7 @@ TEST_F(CudaLearnerTest, CountsAdvantages) {
   }
 }
 
-TEST_F(CudaLearnerTest, SelectsTheTransitionsThatTheFilterKeeps) {
+TEST_F(CudaLearnerTest, SelectsTransitionsKeptByTheFilter) {
   std::mt19937_64 random(5);
   const Executors executors;
   for (const size_t size : {size_t{37 * 53}, size_t{128 * 4096}, size_t{1}, size_t{0}, size_t{1000}}) {
@@ -373,7 +373,7 @@ TEST_F(CudaLearnerTest, SelectingAllocatesNothingAfterTheFirstCallOfASize) {
 }
 
 // Captures reject every call that allocates or waits. Replayed work reads the simulator's state at the replay.
-TEST_F(CudaLearnerTest, AllButSelectingIsCapturedIntoAGraph) {
+TEST_F(CudaLearnerTest, AllKernelsExceptSelectionAreCapturedIntoAGraph) {
   std::mt19937_64 random(8);
   const Executors executors;
   Worlds worlds(short_episodes());
@@ -436,7 +436,7 @@ TEST_F(CudaLearnerTest, AllButSelectingIsCapturedIntoAGraph) {
   EXPECT_NE(all_actions[0], all_actions[1]) << "the step is part of what is drawn from";
 }
 
-TEST_F(CudaLearnerTest, ADeviceThatThereIsNotIsRefused) {
+TEST_F(CudaLearnerTest, AnAbsentDeviceIsRefused) {
   const Device beyond{MemorySpace::cuda, 99};
   EXPECT_THROW(make_learner_executor(beyond), Error);
   EXPECT_THROW(make_scene_history(beyond, {.num_steps = 1}), Error);
@@ -489,7 +489,7 @@ std::vector<int64_t> random_rows(size_t size, int64_t num_rows, std::mt19937_64*
   return rows;
 }
 
-TEST_F(CudaSceneHistoryTest, HoldsAndGathersWhatTheHostsDoes) {
+TEST_F(CudaSceneHistoryTest, HoldsAndGathersTheSameAsOnTheHost) {
   constexpr int kSteps = 6;
   std::mt19937_64 random(9);
   Worlds worlds(short_episodes());
@@ -536,7 +536,7 @@ struct Canvas {
   std::vector<uint8_t> bytes() const { return {images.bytes().begin(), images.bytes().end()}; }
 };
 
-TEST_F(CudaSceneHistoryTest, ImagesOfAnyStepsAreTheOracles) {
+TEST_F(CudaSceneHistoryTest, ImagesOfAnyStepsMatchTheOracle) {
   constexpr int kSteps = 4;
   std::mt19937_64 random(10);
   Worlds worlds(short_episodes());
@@ -556,7 +556,7 @@ TEST_F(CudaSceneHistoryTest, ImagesOfAnyStepsAreTheOracles) {
   EXPECT_GT(std::count_if(drawn.begin(), drawn.end(), [](uint8_t byte) { return byte != 0; }), 10'000);
 }
 
-TEST_F(CudaSceneHistoryTest, AViewOfAStepThatWasNotPutIsBlackAndTold) {
+TEST_F(CudaSceneHistoryTest, AViewOfAMissingStepIsBlackAndReported) {
   Worlds worlds(short_episodes());
   Histories histories(worlds, 2);
   histories.put(0, worlds);

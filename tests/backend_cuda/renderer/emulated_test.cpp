@@ -36,7 +36,7 @@ void expect_oracles(EmulatedRenderer* renderer, const Scene& town, Planes planes
 }
 
 // Random scenes, views, rigs and settings.
-TEST(EmulatedKernels, DrawWhatASoakDraws) {
+TEST(EmulatedKernels, DrawTheScenesOfASoak) {
   const SoakOptions options{.maps = {"procedural:1", "procedural:2"},
                             .agents = 60,
                             .views = 2,
@@ -184,7 +184,7 @@ void expect_some_deferred(uint64_t seed, const EmulatedRenderer::Pool& pool) {
   EXPECT_EQ(renderer.overflow(), 0);
 }
 
-TEST(EmulatedKernels, DeferWhatDoesNotFitIntoThePool) { expect_some_deferred(7, {.faces = 192}); }
+TEST(EmulatedKernels, DeferViewsThatDoNotFitIntoThePool) { expect_some_deferred(7, {.faces = 192}); }
 // The overflow is found after some of an image's faces have been set up.
 TEST(EmulatedKernels, DeferWhenClippedEdgesDoNotFit) { expect_some_deferred(8, {.clipped_edges = 70}); }
 
@@ -242,7 +242,7 @@ TEST(EmulatedKernels, DrawOddSizesAndPlanes) {
   expect_oracles(&renderer, town, Planes::all);
 }
 
-TEST(EmulatedKernels, WriteTheOraclesFormatsAndOrders) {
+TEST(EmulatedKernels, WriteAllFormatsAndOrdersAsTheOracleDoes) {
   Snapshot town = make_synthetic_town(3, 60);
   town.views.resize(1);
   const RendererConfig config = config_of(mixed_rig());
@@ -382,7 +382,7 @@ test::MakeForRig maker(uint64_t first_seed) {
 
 TEST(EmulatedKernels, KeepMapsByHandle) { test::expect_maps_by_handle(maker(40)); }
 
-TEST(EmulatedKernels, DrawAsManyViewsAsTheirCountSays) {
+TEST(EmulatedKernels, DrawTheCountedViews) {
   test::expect_counted_views(maker(50));
   test::expect_counted_queries(maker(60));
 }
@@ -390,7 +390,7 @@ TEST(EmulatedKernels, DrawAsManyViewsAsTheirCountSays) {
 class EmulatedHardScenes : public testing::TestWithParam<HardScene> {};
 INSTANTIATE_TEST_SUITE_P(All, EmulatedHardScenes, testing::ValuesIn(hard_scenes()),
                          [](const auto& scene) { return scene.param.name; });
-TEST_P(EmulatedHardScenes, LookLikeTheOracle) {
+TEST_P(EmulatedHardScenes, MatchTheOracle) {
   EmulatedRenderer renderer(config_of(GetParam().rig), 21);
   expect_oracles(&renderer, GetParam().town, Planes::all);
 }
@@ -408,7 +408,7 @@ TEST(EmulatedKernels, DrawTheOraclesRandomScenes) {
 class EmulatedGoldenScenes : public testing::TestWithParam<std::string> {};
 INSTANTIATE_TEST_SUITE_P(All, EmulatedGoldenScenes, testing::ValuesIn(golden_names(".toml")),
                          [](const auto& scene) { return scene.param; });
-TEST_P(EmulatedGoldenScenes, LookLikeTheOracle) {
+TEST_P(EmulatedGoldenScenes, MatchTheOracle) {
   const SceneFile scene = load_scene(scene_path(GetParam()));
   RendererConfig config = scene.config;
   config.num_threads = 1;

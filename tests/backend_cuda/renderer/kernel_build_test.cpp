@@ -59,18 +59,18 @@ TEST_P(KernelArchitecture, KernelsCompileToCode) {
 INSTANTIATE_TEST_SUITE_P(All, KernelArchitecture, testing::Values(80, 90, 100, 120),
                          [](const auto& capability) { return "sm_" + std::to_string(capability.param); });
 
-TEST(KernelBuild, ADeviceThatNvrtcDoesNotKnowGetsPtx) {
+TEST(KernelBuild, ADeviceUnknownToNvrtcGetsPtx) {
   const KernelCode code = build_kernels(kSmall, {9990, 4, 96, 54});
   EXPECT_THAT(code.architecture, StartsWith("compute_"));
   EXPECT_THAT(code.bytes, HasSubstr(".entry pictura_small("));
   EXPECT_THAT(code.bytes, Not(HasSubstr("fma.rn")));  // the arithmetic contract
 }
 
-TEST(KernelBuild, ADeviceThatIsTooOldIsRefused) {
+TEST(KernelBuild, AnOldDeviceIsRefused) {
   EXPECT_THAT(message_of_build(kSmall, {35}), HasSubstr("compute capability 35: expected"));
 }
 
-TEST(KernelBuild, AFaultIsToldInTheCompilersWords) {
+TEST(KernelBuild, ErrorsContainTheCompilersMessage) {
   EXPECT_THAT(message_of_build({"#include \"pictura/none.cuh\"\n", {}}, kPaperRig),
               AllOf(HasSubstr("sm_90"), HasSubstr("pictura_kernels.cu(1)"), HasSubstr("pictura/none.cuh")));
 }
@@ -139,7 +139,7 @@ TEST_F(KernelCache, AnotherTargetsFileIsRefused) {
   expect_built_anew(read_file(kernel_cache_path(kSmall, {90})));
 }
 
-TEST_F(KernelCache, IsNotNeeded) {
+TEST_F(KernelCache, CanBeAbsentOrDisabled) {
   write_file(folder_ / "cache", "a file where the folder would be");
   EXPECT_FALSE(build_kernels(kSmall, kPaperRig).cached);
   const EnvironmentVariable off("PICTURA_CACHE", "off");
@@ -148,7 +148,7 @@ TEST_F(KernelCache, IsNotNeeded) {
 }
 
 // Errors and notes on a machine without a GPU.
-TEST(NoDevice, CudaIsRefusedAndAutoDrawsOnTheCpuSayingWhy) {
+TEST(NoDevice, CudaIsRefusedAndAutoReportsWhyItUsesTheCpu) {
   const std::string why = cuda_unavailable();
   if (why.empty()) GTEST_SKIP() << "this machine has a CUDA device";
   EXPECT_EQ(test::message_of([] { make_renderer("cuda", {}); }), "renderer cuda: " + why);

@@ -36,17 +36,19 @@ void expect_parity_of_visibility(const Snapshot& town, const RendererConfig& con
   test::expect_equal_visibility(device.get(), oracle.get(), town);
 }
 
-TEST_F(CudaRendererTest, TownsLookLikeTheOracle) { expect_parity(make_synthetic_town(1, 120), {.rig = paper_rig()}); }
+TEST_F(CudaRendererTest, TownsMatchTheOracle) { expect_parity(make_synthetic_town(1, 120), {.rig = paper_rig()}); }
 
-TEST_F(CudaRendererTest, OddSizesAndMixedRigsDoToo) {
+TEST_F(CudaRendererTest, OddSizesAndMixedRigsMatchTheOracle) {
   Snapshot town = make_synthetic_town(2, 60);
   town.views.resize(5);
   expect_parity(town, {.rig = mixed_rig(), .line_floor_px = 0});
 }
 
-TEST_F(CudaRendererTest, WorldsOfSeveralMapsDoToo) { expect_parity(make_synthetic_worlds(), {.rig = paper_rig()}); }
+TEST_F(CudaRendererTest, WorldsOfSeveralMapsMatchTheOracle) {
+  expect_parity(make_synthetic_worlds(), {.rig = paper_rig()});
+}
 
-TEST_F(CudaRendererTest, RandomizedCamerasDoToo) {
+TEST_F(CudaRendererTest, RandomizedCamerasMatchTheOracle) {
   Snapshot town = make_synthetic_town(2, 60);
   town.views.resize(5);
   town.views = test::keyed(town.views);
@@ -71,18 +73,20 @@ TEST_F(CudaRendererTest, RandomizedCamerasDoToo) {
 
 // Sizes of the paper, and one screen-sized image; each builds its own kernels.
 class CudaRendererSizes : public CudaRendererTest, public testing::WithParamInterface<int> {};
-TEST_P(CudaRendererSizes, DoToo) {
+TEST_P(CudaRendererSizes, MatchTheOracle) {
   Snapshot town = make_synthetic_town(6, 80);
   town.views.resize(3);
   expect_parity(town, {.rig = paper_rig(GetParam(), GetParam() * 9 / 16)});
 }
 INSTANTIATE_TEST_SUITE_P(Widths, CudaRendererSizes, testing::Values(32, 64, 96, 192, 384, 768));
 
-TEST_F(CudaRendererTest, CrowdsInImagesOfManyRowsDoToo) { expect_parity(make_crowd(), {.rig = paper_rig(64, 1100)}); }
+TEST_F(CudaRendererTest, CrowdsInImagesOfManyRowsMatchTheOracle) {
+  expect_parity(make_crowd(), {.rig = paper_rig(64, 1100)});
+}
 
-TEST_F(CudaRendererTest, NothingIsCutOffInCrowdedImages) { expect_parity(make_crowd(), {.rig = paper_rig()}); }
+TEST_F(CudaRendererTest, CrowdedImagesAreComplete) { expect_parity(make_crowd(), {.rig = paper_rig()}); }
 
-TEST_F(CudaRendererTest, VisibilityAgrees) {
+TEST_F(CudaRendererTest, VisibilityMatchesTheOracle) {
   Snapshot town = make_synthetic_town(4, 60);
   town.views.resize(3);
   expect_parity_of_visibility(town, {.rig = paper_rig()});
@@ -91,14 +95,16 @@ TEST_F(CudaRendererTest, VisibilityAgrees) {
 class CudaHardScenes : public CudaRendererTest, public testing::WithParamInterface<HardScene> {};
 INSTANTIATE_TEST_SUITE_P(All, CudaHardScenes, testing::ValuesIn(hard_scenes()),
                          [](const auto& scene) { return scene.param.name; });
-TEST_P(CudaHardScenes, LookLikeTheOracle) { expect_parity(GetParam().town, {.rig = GetParam().rig}); }
-TEST_P(CudaHardScenes, AreSeenAsMuch) { expect_parity_of_visibility(GetParam().town, {.rig = GetParam().rig}); }
+TEST_P(CudaHardScenes, MatchTheOracle) { expect_parity(GetParam().town, {.rig = GetParam().rig}); }
+TEST_P(CudaHardScenes, VisibilityMatchesTheOracle) {
+  expect_parity_of_visibility(GetParam().town, {.rig = GetParam().rig});
+}
 
 // Values and planes of golden scenes; golden_test compares their pictures in bytes.
 class CudaGoldenScenes : public CudaRendererTest, public testing::WithParamInterface<std::string> {};
 INSTANTIATE_TEST_SUITE_P(All, CudaGoldenScenes, testing::ValuesIn(golden_names(".toml")),
                          [](const auto& scene) { return scene.param; });
-TEST_P(CudaGoldenScenes, LookLikeTheOracle) {
+TEST_P(CudaGoldenScenes, MatchTheOracle) {
   const SceneFile scene = load_scene(scene_path(GetParam()));
   expect_parity(Snapshot{scene.geometry, scene.scene, scene.views}, scene.config);
 }
@@ -137,7 +143,7 @@ TEST_F(CudaRendererTest, FaultsOfTheDeviceAreThrownByTheNextCall) {
   EXPECT_THROW(renderer->render(scene.batch(), good.span(), shape.batch()), Error);
 }
 
-TEST_F(CudaRendererTest, WrongDevicesAreRefusedByName) {
+TEST_F(CudaRendererTest, ErrorsNameTheWrongDevice) {
   RendererConfig config{.rig = paper_rig(8, 8), .device = {MemorySpace::cuda, 0}};
   const auto renderer = make_renderer("cuda", config);
   EXPECT_EQ(renderer->device(), config.device);
@@ -160,7 +166,7 @@ TEST_F(CudaRendererTest, WrongDevicesAreRefusedByName) {
 }
 
 // Callers need not make the renderer's device current; the call restores the current device.
-TEST_F(CudaRendererTest, DrawsOnItsDeviceWhateverTheCurrentOneIs) {
+TEST_F(CudaRendererTest, DrawsOnItsDeviceForAnyCurrentDevice) {
   int devices = 0;
   PICTURA_CUDA(cudaGetDeviceCount(&devices));
   if (devices < 2) GTEST_SKIP() << "needs two CUDA devices";
@@ -203,13 +209,13 @@ TEST_F(CudaRendererTest, KeepsMapsByHandle) {
 
 TEST_F(CudaRendererTest, DrawsPatches) { test::expect_patches(make_for_host); }
 
-TEST_F(CudaRendererTest, DrawsAsManyViewsAsItsCountSays) {
+TEST_F(CudaRendererTest, DrawsTheCountedViews) {
   test::expect_counted_views(make_for_host);
   test::expect_counted_queries(make_for_host);
 }
 
 // Host data is checked on the host, before the device reads it.
-TEST_F(CudaRendererTest, HostCallersLearnAtOnceWhatIsWrong) {
+TEST_F(CudaRendererTest, HostInputIsCheckedAtOnce) {
   Snapshot town = make_synthetic_town(5, 5);
   const RendererConfig config{.rig = paper_rig(8, 8)};
   const auto renderer = make_renderer("cuda", config);

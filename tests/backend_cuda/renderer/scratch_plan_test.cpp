@@ -16,7 +16,7 @@ namespace {
 constexpr ScratchNeeds kNeeds{
     .large_blocks = 8, .large_block_bytes = 20'000'000, .views = 1'024, .view_bytes = 280'000, .pool_bytes = 300'000};
 
-TEST(ScratchPlan, GivesAllThatIsNeededWhereThereIsRoom) {
+TEST(ScratchPlan, MeetsAllNeedsWithinTheBound) {
   const ScratchPlan plan = plan_scratch(kNeeds, std::size_t{1} << 30);
   EXPECT_EQ(plan.large_blocks, 8);
   EXPECT_EQ(plan.views, 1'024u);
@@ -37,7 +37,7 @@ TEST(ScratchPlan, StaysUnderEveryBoundAndUsesMostOfIt) {
   }
 }
 
-TEST(ScratchPlan, ABatchIsCutWhereItsViewsDoNotFit) {
+TEST(ScratchPlan, ALargeBatchIsDivided) {
   const std::size_t least = bytes_of({1, 1}, kNeeds);
   EXPECT_EQ(plan_scratch(kNeeds, least).views, 1u);
   EXPECT_EQ(plan_scratch(kNeeds, least + 700'000).views, 3u);
@@ -49,7 +49,7 @@ TEST(ScratchPlan, ViewsComeBeforeBlocksOfTheLastLaunch) {
   EXPECT_EQ(plan_scratch(kNeeds, all_views + 3 * kNeeds.large_block_bytes).large_blocks, 4);
 }
 
-TEST(ScratchPlan, SaysHowMuchItNeedsAtLeast) {
+TEST(ScratchPlan, ReportsTheMinimumSize) {
   EXPECT_EQ(test::message_of([] { plan_scratch(kNeeds, 1000); }),
             "renderer cuda: max_scratch_bytes: expected at least 20580000, got 1000");
 }
@@ -61,7 +61,7 @@ struct CountedBuffer : std::vector<Value> {
   explicit CountedBuffer(std::size_t size) : std::vector<Value>(size) { allocated_bytes += size * sizeof(Value); }
 };
 
-TEST(Pool, TakesWhatItIsReckonedToTake) {
+TEST(Pool, AllocatesTheComputedSize) {
   for (const std::size_t images : {1, 2, 3, 4, 5, 28, 1'000}) {
     const PoolSizes sizes = pool_sizes(images);
     allocated_bytes = 0;

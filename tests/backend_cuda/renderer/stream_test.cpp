@@ -88,7 +88,7 @@ TEST_F(CudaStreamTest, AllFormatsHoldTheSameColours) {
   EXPECT_GT(lit, floats.size() / 100);
 }
 
-TEST_F(CudaStreamTest, WritesEveryValueOfItsImagesAndNothingElse) {
+TEST_F(CudaStreamTest, WritesExactlyTheValuesOfItsImages) {
   constexpr std::size_t kViews = 5, kGap = 7;
   Rig rig = paper_rig(33, 19);
   rig.cameras[2] = paper_rig(8, 40).cameras[2];
@@ -250,7 +250,7 @@ TEST_F(CudaStreamTest, IsCapturedIntoAGraph) {
   PICTURA_CUDA(cudaStreamDestroy(stream));
 }
 
-TEST_F(CudaStreamTest, ACaptureAfterReserveNeedsNoCallBefore) {
+TEST_F(CudaStreamTest, ACaptureAfterReserveNeedsNoEarlierRender) {
   const std::vector<uint8_t> expected = bytes_of(Stage(60, 7, {.rig = paper_rig()}).draw());
   Stage stage(60, 7, {.rig = paper_rig()});
   const int boxes = static_cast<int>(stage.town.scene.agents.size());
@@ -294,7 +294,7 @@ TEST_F(CudaStreamTest, ACaptureAfterReserveNeedsNoCallBefore) {
   EXPECT_THAT(test::message_of([&] { stage.renderer->reserve(-1, 0); }), HasSubstr("reserve: expected 0 views"));
 }
 
-TEST_F(CudaStreamTest, PollsWithoutWaitingAndChecksItsStreamAlone) {
+TEST_F(CudaStreamTest, PollsWithoutWaitingAndChecksOnlyItsStream) {
   Stage stage(20, 2, {.rig = paper_rig(16, 9)});
   stage.draw();
   stage.town.views[1].world = 9;
@@ -439,7 +439,7 @@ TEST_F(CudaStreamTest, DrawsTheSameInPartsUnderATightBound) {
   EXPECT_THAT(test::message_of([&] { parts.draw(); }), HasSubstr("view 5: no such world"));
 }
 
-TEST_F(CudaStreamTest, ACallThatFindsNoRoomHarmsNoOther) {
+TEST_F(CudaStreamTest, AnOutOfMemoryCallDoesNotAffectLaterCalls) {
   RendererConfig config{.rig = paper_rig()};
   config.max_scratch_bytes = min_scratch_bytes(5, 1, config);
   Stage stage(5, 1, config);

@@ -210,7 +210,7 @@ TEST_F(CudaSimulatorTest, CarlaTownsOver1000Steps) {
   }
 }
 
-TEST_F(CudaSimulatorTest, LightsThatCycleAlone) {
+TEST_F(CudaSimulatorTest, IndependentLights) {
   SimulatorConfig config = whole_world();
   config.episode_steps = 200;
   config.light_cycles = LightCycles::independent;
@@ -236,7 +236,7 @@ TEST_F(CudaSimulatorTest, ImpairedAgents) {
   expect_parity(config, {load_map("procedural:1")}, draw_worlds(5, 120, 1, 60, 1), 500);
 }
 
-TEST_F(CudaSimulatorTest, RoadsThatEndOver1000Steps) {
+TEST_F(CudaSimulatorTest, OpenRoadsOver1000Steps) {
   SimulatorConfig config = whole_world();
   config.episode_steps = 700;
   config.reset_inactive_fraction = 2;
@@ -326,7 +326,7 @@ void expect_same_records(AfterInfraction after_infraction, bool leave_at_goal) {
   ASSERT_EQ(cpu->save(), cuda->save());
 }
 
-TEST_F(CudaSimulatorTest, ReplaysTracksThatTheMapChooses) {
+TEST_F(CudaSimulatorTest, ReplaysTracksOfTheChosenMap) {
   const auto scene = test::crossing({.num_vehicles = 40, .num_pedestrians = 10});
   SimulatorConfig config = scene_config(*scene);
   config.reset_inactive_fraction = 1;
@@ -347,12 +347,12 @@ TEST_F(CudaSimulatorTest, ReplaysTracksThatTheMapChooses) {
 
 TEST_F(CudaSimulatorTest, FollowsRecordsAndTakesOver) { expect_same_records(AfterInfraction::halt, false); }
 
-TEST_F(CudaSimulatorTest, EndsAgentsAsTheRulesSay) {
+TEST_F(CudaSimulatorTest, EndsAgentsByTheRules) {
   expect_same_records(AfterInfraction::leave, true);
   expect_same_records(AfterInfraction::drive_on, true);
 }
 
-TEST_F(CudaSimulatorTest, WhatOneSavesTheOtherRestores) {
+TEST_F(CudaSimulatorTest, SavesAndRestoresAcrossBackends) {
   SimulatorConfig config = whole_world();
   config.episode_steps = 70;
   const Maps maps{load_map("procedural:1"), load_map("procedural:2")};
@@ -407,7 +407,7 @@ TEST_F(CudaSimulatorTest, AGraphReplaysSteps) {
   PICTURA_CUDA(cudaStreamDestroy(stream));
 }
 
-TEST_F(CudaSimulatorTest, OtherWorldsAreThoseOfANewSimulatorAndAllocateNothing) {
+TEST_F(CudaSimulatorTest, ReplacedWorldsEqualANewSimulatorsAndAllocateNothing) {
   const SimulatorConfig config{.episode_steps = 25, .parked_cars = 5};
   const CompiledMaps maps =
       compile_maps({load_map("procedural:1"), load_map("procedural:2"), load_map("procedural:3")}, map_options(config));
@@ -435,7 +435,7 @@ TEST_F(CudaSimulatorTest, OtherWorldsAreThoseOfANewSimulatorAndAllocateNothing) 
   EXPECT_EQ(cuda->scene().agents.data(), boxes);
 }
 
-TEST_F(CudaSimulatorTest, ASnapshotIsTheStateThatWas) {
+TEST_F(CudaSimulatorTest, ASnapshotKeepsItsState) {
   SimulatorConfig config = whole_world();
   config.episode_steps = 30;
   const Maps maps{load_map("procedural:1")};
@@ -700,7 +700,7 @@ TEST_F(CudaSimulatorTest, IsDrivenByInverseActionsAndTheDriverModel) {
   }
 }
 
-TEST_F(CudaSimulatorTest, AnActionOutOfRangeChangesNothingAndIsThrownLater) {
+TEST_F(CudaSimulatorTest, AnActionOutOfRangeChangesNothingAndIsReportedLater) {
   const auto cuda = make_simulator("cuda", {}, {load_map("procedural:1")}, {{0, 30, 0}, {0, 10, 1}});
   std::vector<int32_t> actions(40, 7);
   actions[33] = kNumActions;
@@ -721,7 +721,7 @@ TEST_F(CudaSimulatorTest, AnActionOutOfRangeChangesNothingAndIsThrownLater) {
   EXPECT_NE(cuda->state_hash(), before);
 }
 
-TEST_F(CudaSimulatorTest, ActionsThatAreNotTheArrayThatItExpectsAreRefusedAtOnce) {
+TEST_F(CudaSimulatorTest, ActionArraysOfWrongTypeOrSizeAreRefusedAtOnce) {
   const auto cuda = make_simulator("cuda", {}, {load_map("procedural:1")}, {{0, 40, 0}});
   const uint64_t before = cuda->state_hash();
   const Device device = cuda->device();

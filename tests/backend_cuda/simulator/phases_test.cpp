@@ -77,7 +77,7 @@ TEST(Phases, GiveTheBitsOfTheCpuExecutorInAnyOrderOfThreads) {
   expect_same(config, maps, draw_worlds(6, 100, 1, 60, 3), 70, 2);
 }
 
-TEST(Phases, LetEachLightCycleAlone) {
+TEST(Phases, RunIndependentLights) {
   SimulatorConfig config;
   config.episode_steps = 40;
   config.light_cycles = LightCycles::independent;
@@ -87,7 +87,7 @@ TEST(Phases, LetEachLightCycleAlone) {
   }
 }
 
-TEST(Phases, LeaveAndEnterRoadsThatEnd) {
+TEST(Phases, LeaveAndEnterOpenRoads) {
   SimulatorConfig config;
   config.episode_steps = 400;
   config.reset_inactive_fraction = 2;
@@ -137,7 +137,7 @@ TEST(Phases, ImpairAgents) {
   }
 }
 
-TEST(Phases, PlaceCrowdsAsOneAfterTheOtherWould) {
+TEST(Phases, PlaceCrowdsAsSerialCodeDoes) {
   // A ring of 251 m holds about forty cars: almost every choice depends on earlier choices.
   const SimulatorConfig config = testing::cars({.episode_steps = 3});
   expect_same(config, {testing::ring_road(40)}, {{0, 300, 0}, {0, 37, 1}, {0, 1, 2}}, 12, 3);
@@ -153,7 +153,7 @@ TEST(Phases, SortCrowdsIntoCells) {
   expect_same(config, {town}, {{0, 600, 0}, {0, 20, 1}}, 14, 15, /*by_commands=*/true);
 }
 
-TEST(Phases, LetCrowdsEnter) {
+TEST(Phases, AdmitEnteringCrowds) {
   SimulatorConfig config;
   config.reset_inactive_fraction = 2;
   config.parked_cars = 2;
@@ -206,7 +206,7 @@ TEST(Phases, FollowRecordsOfReplayedTracks) {
   expect_same(config, maps, worlds, 60, 13, /*by_commands=*/true);
 }
 
-TEST(Phases, EndAgentsAsTheRulesSay) {
+TEST(Phases, EndAgentsByTheRules) {
   const auto scene = test::crossing({.num_steps = 40, .num_pedestrians = 6});
   SimulatorConfig config = scene_config(*scene);
   config.leave_at_goal = true;
