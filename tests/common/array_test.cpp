@@ -14,7 +14,7 @@ using ::testing::HasSubstr;
 
 constexpr Device kGpu{MemorySpace::cuda, 1};
 
-TEST(Array, OfAContainerIsOneDimensionOnTheHost) {
+TEST(Array, AContainerIsOneDimensionOnTheHost) {
   std::vector<int32_t> actions{1, 2, 3};
   const Array array = actions;
   EXPECT_EQ(array.text(), "i32 [3] on cpu");
@@ -50,7 +50,7 @@ TEST(Array, StridesFollowTheShape) {
   EXPECT_EQ(array.shape.count(), 24);
 }
 
-TEST(Array, RejectsByName) {
+TEST(Array, ErrorsNameTheArray) {
   std::vector<float> values(8);
   const Array array = values;
   auto refused = [&](auto element, Dims shape, Device device) {

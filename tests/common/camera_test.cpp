@@ -101,7 +101,7 @@ TEST(Rig, ARigFileIsRead) {
   EXPECT_EQ(rig.cameras[1].width_px, 97);
 }
 
-TEST(Rig, BadRigsAreRejectedByName) {
+TEST(Rig, ErrorsNameTheFaultOfARig) {
   EXPECT_THAT(
       message_of([] { load_rig(written("[[camera]]\nname = \"a\"\nwidth_px = 0\nheight_px = 0\nfocal_px = 3\n")); }),
       HasSubstr(".toml:3: camera 0 'a': width_px: expected an integer in [1, 8192], got 0"));

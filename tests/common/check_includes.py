@@ -57,7 +57,7 @@ STAYS_IN = [
     (re.compile(r"^CLI/"), re.compile(r"^(apps|cli|bench/commands)/")),
 ]
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')
-# Compiler tests, and the files that may contain them: what differs by compiler has one folder.
+# Compiler tests, and the files that may contain them: code that differs by compiler has one folder.
 COMPILER_TEST = re.compile(r"__CUDACC__|__CUDA_ARCH__|__CUDACC_RTC__")
 COMPILER_TESTS = re.compile(r"^(common/portable|tests|bench)/")
 # Parsers of numbers that obey the locale, in which 1.5 may be 1,5; and the library's parser of JSON, which takes any depth.

@@ -40,12 +40,12 @@ TEST(Grid, EveryBoxIsInEveryCellThatItTouches) {
   }
 }
 
-TEST(Grid, OfNothingIsEmpty) {
+TEST(Grid, IsEmptyWithoutBoxes) {
   const Grid grid(Span<const Aabb2>{}, 5.0f);
   EXPECT_EQ(grid.view().items.size(), 0u);
 }
 
-TEST(Grid, RejectsWhatCannotBeIndexed) {
+TEST(Grid, RejectsBoxesThatCannotBeIndexed) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<Aabb2> bad{{{0, 0}, {nan, 1}}};
   EXPECT_THROW(Grid(bad, 5.0f), Error);

@@ -47,7 +47,7 @@ TEST(ImageLayout, InterleavedChannelsAreNextToEachOther) {
 }
 
 // 54 rows in patches of 12 px make five rows of patches, like 18 rows in patches of 4 px.
-TEST(ImageLayout, PatchesPutPixelsByHand) {
+TEST(ImageLayout, PatchesMatchHandComputedPixels) {
   static_assert(patches_along(12, 54) == 5 && patches_along(4, 18) == 5 && patches_along(12, 96) == 8);
   static_assert(patch_values(8) == 192 && patch_values(12) == 432 && patch_values(16) == 768);
   EXPECT_EQ(place_in_patches(4, 10, 2, 9, 5), (1 * 3 + 2) * 48 + (2 * 4 + 1) * 4 + 1);

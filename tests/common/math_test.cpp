@@ -48,7 +48,7 @@ TEST(Math, ExponentialIsWithin2e7Relative) {
   EXPECT_TRUE(std::isnan(exp_of(std::numeric_limits<float>::quiet_NaN())));
 }
 
-TEST(Math, WrappedAnglesStayWithinPiAndKeepTheirDirection) {
+TEST(Math, WrappedAnglesAreWithinPiAndKeepTheirDirection) {
   for (int i = -1000; i <= 1000; ++i) {
     const float x = static_cast<float>(i) * 0.37f;
     const float wrapped = wrap_angle(x);

@@ -45,7 +45,7 @@ TEST(Rng, StreamsOfDifferentKeysDiffer) {
   EXPECT_EQ(first_draws.size(), 3u * 2 * 3 * 2 * 2 * 3);
 }
 
-TEST(Rng, KeysBeyondTheirFieldsAreFaults) {
+TEST(Rng, KeysBeyondTheirFieldsAreRefused) {
   EXPECT_TRUE((RandomKey{.agent = 4095, .purpose = Purpose::soak}.is_in_range()));
   EXPECT_FALSE((RandomKey{.agent = 4096}.is_in_range()));
   // Such a key would have the draws of agent 0.

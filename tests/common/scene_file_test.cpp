@@ -134,7 +134,7 @@ TEST(SceneFile, WholeNumbersHaveAnyNotation) {
   EXPECT_EQ(scene.scene.hidden_agents, std::vector<int32_t>{0});
 }
 
-TEST(SceneFile, BadFilesAreRejectedWithTheirLine) {
+TEST(SceneFile, ErrorsNameTheLineOfBadFiles) {
   EXPECT_THAT(parse_error("[[view\n"), HasSubstr("s.toml:1: "));
   EXPECT_THAT(parse_error(""), HasSubstr("expected one or more [[view]] tables"));
   EXPECT_THAT(parse_error("sky = 1\n" + kView), HasSubstr("s.toml:1: unknown key 'sky'; known keys: camera, rig"));
@@ -184,7 +184,7 @@ TEST(SceneFile, BadFilesAreRejectedWithTheirLine) {
   EXPECT_THAT(parse_error(zigzag + "]\n"), HasSubstr("points_m: expected at most 100000 m of line"));
 }
 
-TEST(SceneFile, WhatWouldDrawNothingIsRefused) {
+TEST(SceneFile, ObjectsThatDrawNothingAreRefused) {
   EXPECT_THAT(parse_error("camera = []\n" + kView),
               HasSubstr("s.toml:1: camera: expected one or more [[camera]] tables"));
   EXPECT_THAT(parse_error(kAgent + kView + "hidden = [0, 0]\n"), HasSubstr("hidden: agent 0 is listed twice"));
@@ -200,7 +200,7 @@ TEST(SceneFile, WhatWouldDrawNothingIsRefused) {
               HasSubstr("half_angle_deg: expected a number in [0.1, 180], got 0"));
 }
 
-TEST(SceneFile, MessagesAreOneLineAndNameWhatWasMeant) {
+TEST(SceneFile, MessagesAreOneLineAndListKnownKeys) {
   const std::string one_table = parse_error("[view]\nx_m = 1.0\ny_m = 2.0\nheading_deg = 3.0\n");
   EXPECT_THAT(one_table, HasSubstr("s.toml:1: view: expected [[view]] tables, got a table [view]"));
   EXPECT_THAT(parse_error(kView + "x = 1\n"), HasSubstr("heading_deg, ego, body_length_m, hidden"));
@@ -221,7 +221,7 @@ TEST(SceneFile, PixelsOfThePapersCamerasCanBeSquareAtAnySize) {
   EXPECT_GT(stretched.focal_y_px, 1.7f * stretched.focal_x_px);
 }
 
-TEST(SceneFile, APipeIsRefusedInsteadOfWaitedFor) {
+TEST(SceneFile, APipeIsRefusedWithoutWaiting) {
   const test::ScratchFolder folder;
   const std::string pipe = folder / "pipe.toml";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);

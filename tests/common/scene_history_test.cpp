@@ -158,7 +158,7 @@ void expect_holds(const SceneHistory& history, const std::vector<Step>& steps) {
   }
 }
 
-TEST(SceneHistory, HoldsTheStepsThatWerePutSoFar) {
+TEST(SceneHistory, HoldsAllStoredSteps) {
   const std::unique_ptr<SceneHistory> history = make_host_scene_history(size_of_steps());
   expect_holds(*history, {});
   std::vector<Step> steps;
@@ -171,7 +171,7 @@ TEST(SceneHistory, HoldsTheStepsThatWerePutSoFar) {
   ASSERT_NE(values(steps[0].scene.batch().light_begin), values(steps[1].scene.batch().light_begin));
 }
 
-TEST(SceneHistory, AStepThatIsPutAgainReplacesTheOneBeforeAndNoOther) {
+TEST(SceneHistory, StoringAStepAgainReplacesOnlyThatStep) {
   const std::unique_ptr<SceneHistory> history = history_of(kSteps);
   for (const int step : {1, 0, kSteps - 1}) {
     std::vector<Step> steps;
@@ -185,7 +185,7 @@ TEST(SceneHistory, AStepThatIsPutAgainReplacesTheOneBeforeAndNoOther) {
   }
 }
 
-TEST(SceneHistory, ImagesOfAnyViewsOfAnyStepsAreThoseOfTheirOwnSteps) {
+TEST(SceneHistory, ImagesOfAnyStepsEqualThoseOfTheirScenes) {
   const std::unique_ptr<SceneHistory> history = history_of(kSteps);
   // Every view of every step, in a mixed order (7 and 30 have no common divisor), and some views twice.
   std::vector<int64_t> rows = all_rows(kSteps);
@@ -203,7 +203,7 @@ TEST(SceneHistory, ImagesOfAnyViewsOfAnyStepsAreThoseOfTheirOwnSteps) {
   EXPECT_NE(own[0], own[kViews]) << "steps look different";
 }
 
-TEST(SceneHistory, RowsOfStepsThatWereNotPutAreRefusedByRenderers) {
+TEST(SceneHistory, RenderersRefuseRowsOfMissingSteps) {
   const std::unique_ptr<SceneHistory> history = history_of(2);
   EXPECT_NO_THROW(draw(history->scene(), gathered(*history, {0, 2 * kViews - 1})));
   for (const int64_t row : {int64_t{2 * kViews}, int64_t{kSteps * kViews}, int64_t{-1}, int64_t{1} << 40}) {
@@ -213,7 +213,7 @@ TEST(SceneHistory, RowsOfStepsThatWereNotPutAreRefusedByRenderers) {
   }
 }
 
-TEST(SceneHistory, ViewsThatAreRefusedOfTheirStepAreRefusedOfTheHistory) {
+TEST(SceneHistory, InvalidViewsOfAStepAreInvalidInTheHistory) {
   const std::vector<std::function<void(View*)>> damages{
       [](View* view) { view->world = -1; }, [](View* view) { view->world = kWorlds; },
       [](View* view) { view->ego_agent = kAgents; }, [](View* view) { view->ego_agent = -2; },
@@ -229,7 +229,7 @@ TEST(SceneHistory, ViewsThatAreRefusedOfTheirStepAreRefusedOfTheHistory) {
   }
 }
 
-TEST(SceneHistory, ScenesOfAnotherDeviceOrSizeAreRefusedByName) {
+TEST(SceneHistory, ErrorsNameTheDeviceOrSizeThatDiffers) {
   const std::unique_ptr<SceneHistory> history = history_of(1);
   const Step step = make_step(1);
   const auto refusal = [&](const std::function<void(SceneBatch*)>& change) {
@@ -262,7 +262,7 @@ TEST(SceneHistory, ScenesOfAnotherDeviceOrSizeAreRefusedByName) {
   expect_holds(*history, {make_step(0)});
 }
 
-TEST(SceneHistory, StepsAreNeitherLeftOutNorBeyondTheHistory) {
+TEST(SceneHistory, SkippedStepsAndStepsBeyondTheHistoryAreRefused) {
   const std::unique_ptr<SceneHistory> history = make_host_scene_history(size_of_steps());
   const Step step = make_step(0);
   const auto put = [&](int at) { return message_of([&] { history->put(at, step.scene.batch(), step.views); }); };
@@ -272,7 +272,7 @@ TEST(SceneHistory, StepsAreNeitherLeftOutNorBeyondTheHistory) {
   EXPECT_EQ(put(kSteps), "scene history: expected a step of 0 to 2, got 3");
 }
 
-TEST(SceneHistory, ThereIsMemoryForAsManyViewsAsRows) {
+TEST(SceneHistory, HasMemoryForOneViewPerRow) {
   const std::unique_ptr<SceneHistory> history = history_of(1);
   std::vector<View> views(2);
   const std::vector<int64_t> rows{0, 1, 2};
@@ -280,7 +280,7 @@ TEST(SceneHistory, ThereIsMemoryForAsManyViewsAsRows) {
   EXPECT_NO_THROW(history->gather({}, {}));
 }
 
-TEST(SceneHistory, SizesThatNoSceneCanHaveAreRefusedByName) {
+TEST(SceneHistory, ErrorsNameImpossibleSizes) {
   const auto refusal = [](const SceneHistorySize& size) { return message_of([&] { make_host_scene_history(size); }); };
   constexpr int kMany = 1 << 20;
   EXPECT_EQ(refusal({.num_steps = 0}), "scene history: expected one step or more, got 0");

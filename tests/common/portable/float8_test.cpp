@@ -24,7 +24,7 @@ TEST(Float8, HasTheSameBitsInARegisterAndInMemory) {
   }
 }
 
-TEST(Float8, CountsTheFirstOfAnyNumber) {
+TEST(Float8, MasksTheFirstLanesOfAnyCount) {
   EXPECT_EQ(first_lanes_mask(-1), 0u);
   EXPECT_EQ(first_lanes_mask(0), 0u);
   EXPECT_EQ(first_lanes_mask(3), 0b111u);

@@ -112,7 +112,7 @@ void expect_covered(const std::vector<Vec2>& polygon) {
   }
 }
 
-TEST(Coverage, AreaIsExactAndSamplesAreThoseInside) {
+TEST(Coverage, AreaIsExactAndSamplesInsideAreCovered) {
   std::mt19937 random(1);
   for (int round = 0; round < 400; ++round) {
     SCOPED_TRACE(round);
@@ -202,7 +202,7 @@ TEST(Coverage, ASharedEdgeSplitsAreaAndSamplesWithoutGapOrOverlap) {
   }
 }
 
-TEST(Coverage, BothDirectionsOfAnEdgeAreOppositesWhereverItLies) {
+TEST(Coverage, BothDirectionsOfAnEdgeHaveOppositeSigns) {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> unit(0, 1);
   int split = 0;
@@ -271,7 +271,7 @@ TEST(Coverage, TwoFacesOfOneThirdAndTwoThirdsFillAPixel) {
   EXPECT_NEAR(color_of({{{1.0f / 3, third}, third, {1, 1, 1}}, {{2.0f / 3, ~third}, ~third, {1, 1, 1}}}).r, 1, 2e-6);
 }
 
-TEST(Coverage, AFullFragmentGetsTheRemainderOfTheOthers) {
+TEST(Coverage, AFullFragmentGetsTheRemainingWeight) {
   // In front, a quarter of the area although 20 of 64 samples; behind it, a partly occluded fragment, weighted by
   // samples; then a wall.
   const uint64_t front = (1ull << 20) - 1, middle = (1ull << 40) - 1;
@@ -283,7 +283,7 @@ TEST(Coverage, AFullFragmentGetsTheRemainderOfTheOthers) {
   EXPECT_NEAR(color.b, 0.5f, 2e-6f);
 }
 
-TEST(Coverage, AFullFragmentGetsAreaThatNoSampleShows) {
+TEST(Coverage, AFullFragmentGetsAreaWithoutSamples) {
   // Two faces that cover all samples but not all of the area.
   const uint64_t half = 0xFFFFFFFFull;
   const Rgb color = color_of({{{0.48f, half}, half, {1, 0, 0}},
@@ -324,7 +324,7 @@ TEST(Coverage, IgnoresStripsBelowTheirMinimumArea) {
   }
 }
 
-TEST(Coverage, ClippingKeepsWhatIsInFront) {
+TEST(Coverage, ClippingKeepsThePartInFront) {
   Rig rig = paper_rig();
   PinholeCamera camera;
   camera.right = {1, 0, 0};

@@ -57,7 +57,7 @@ bool occludes(const WallFace& wall, Vec3 a_m, Vec3 b_m) {
   return setting.occluders.occludes(setting.camera, bounds);
 }
 
-TEST(Occluders, OccludeWhatIsBehindThemInDepthAndOnScreen) {
+TEST(Occluders, OccludeObjectsBehindThem) {
   const WallFace wall = wall_between({20, -6, 0}, {20, 6, 0});
   EXPECT_TRUE(occludes(wall, {40, -4, 0}, {50, 4, 0}));
   EXPECT_TRUE(occludes(wall_between({20, 6, 0}, {20, -6, 0}), {40, -4, 0}, {50, 4, 0})) << "the other way round";
@@ -72,7 +72,7 @@ TEST(Occluders, OccludeWhatIsBehindThemInDepthAndOnScreen) {
   EXPECT_FALSE(occludes(wall_between({130, -60, 0}, {130, 60, 0}), {140, -4, 0}, {141, 4, 0})) << "black";
 }
 
-TEST(Occluders, OccludeAStripFromBelowOnlyWhereTheyCannotStandOnIt) {
+TEST(Occluders, OccludeAStripSeenFromBelowUnlessTheyStandOnIt) {
   // A wall at 20 m and level strips behind it. Three are 3 m above the eye, so that solids on them are at most three
   // times nearer; one, below the eye, is hidden in any case.
   const ImageSetting setting = setting_with(wall_between({20, -6, 0}, {20, 6, 0}));
@@ -94,7 +94,7 @@ TEST(Occluders, OccludeAStripFromBelowOnlyWhereTheyCannotStandOnIt) {
   }
 }
 
-TEST(Occluders, AreThoseThatCoverMost) {
+TEST(Occluders, HaveTheLargestCoverage) {
   // Walls of one size at different distances, and a box's side that covers as much as a wall at 10 m; also walls
   // outside the frame, behind the camera, and black.
   StaticGeometry geometry;

@@ -19,7 +19,7 @@ void expect_near(Vec3 actual, Vec3 expected) {
   EXPECT_NEAR(actual.z, expected.z, 1e-6f);
 }
 
-TEST(RandomizedCamera, IsTurnedByTheAnglesOfARig) {
+TEST(RandomizedCamera, RotatesAsAnglesOfARigDo) {
   // Rotated from no pose, a camera has the axes of a rig's camera with these angles.
   const Camera straight{.width_px = 8, .height_px = 8, .focal_x_px = 4, .focal_y_px = 4};
   Camera turned = straight;
@@ -103,7 +103,7 @@ TEST(RandomizedCamera, AMountingLastsForAnEpisodeOfAnAgentsCamera) {
 }
 
 // Runs with different severities therefore differ in nothing else.
-TEST(RandomizedCamera, HalfTheSeverityIsHalfOfTheSameDraws) {
+TEST(RandomizedCamera, HalfTheSeverityHalvesTheSameDraws) {
   const CameraMounting whole = draw_mounting(kFullCameraSeverity, kKey, 3),
                        half = draw_mounting(scaled(kFullCameraSeverity, 0.5), kKey, 3);
   EXPECT_FLOAT_EQ(half.yaw_rad, 0.5f * whole.yaw_rad);
@@ -115,7 +115,7 @@ TEST(RandomizedCamera, HalfTheSeverityIsHalfOfTheSameDraws) {
   EXPECT_EQ(half_effect.noise_key[1], full_effect.noise_key[1]);
 }
 
-TEST(RandomizedCamera, ImagesAreDroppedAsOftenAsAskedFor) {
+TEST(RandomizedCamera, ImagesAreDroppedAtTheConfiguredRate) {
   const CameraRandomization ranges{.dropped_probability = 0.25};
   constexpr int kSteps = 4000;
   int black = 0;
@@ -134,7 +134,7 @@ TEST(RandomizedCamera, ADeadCameraIsBlackInEveryStep) {
   }
 }
 
-TEST(RandomizedCamera, NoiseHasItsDeviationAndIsAnothersInEachStepAndCamera) {
+TEST(RandomizedCamera, NoiseHasItsDeviationAndDiffersByStepAndCamera) {
   const CameraRandomization ranges{.noise_share = 0.1};
   const Rgb grey{0.5f, 0.5f, 0.5f};
   double sum = 0, squares = 0;
@@ -164,7 +164,7 @@ TEST(RandomizedCamera, BrightnessScalesBytes) {
 }
 
 // A seed identifies a run, so its draws must not change.
-TEST(RandomizedCamera, DrawsAreThoseOfEarlierVersions) {
+TEST(RandomizedCamera, DrawsEqualThoseOfEarlierVersions) {
   const CameraMounting mounting = draw_mounting(kFullCameraSeverity, kKey, 1);
   EXPECT_EQ(mounting.yaw_rad, 0.09573058f);
   EXPECT_EQ(mounting.shift_m.y, -0.096921921f);

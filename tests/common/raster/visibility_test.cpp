@@ -140,7 +140,7 @@ float enter(const AgentBox& box, Vec3 eye, Vec3 ray) {
   return from < to ? from : -1;
 }
 
-TEST(Order, OfDisjointBoxesIsWhatRaysSee) {
+TEST(Order, DisjointBoxesAreOrderedAsRaysHitThem) {
   std::mt19937 random(4);
   std::uniform_real_distribution<float> ahead(4, 40), aside(-15, 15), foot(-3, 1), size(0.2f, 20), angle(-3, 3);
   const Vec3 eye{0, 0, 1};
@@ -164,7 +164,7 @@ TEST(Order, OfDisjointBoxesIsWhatRaysSee) {
   EXPECT_GT(compared, 20000);
 }
 
-TEST(Order, OfLevelsIsByHeight) {
+TEST(Order, LevelsAreOrderedByHeight) {
   // A car on a bridge above another car, seen from below both, from above, and from between.
   const AgentBox low = make_box(AgentClass::vehicle, {12, 0, 0}, 0, {14, 2, 1.5f});
   const AgentBox high = make_box(AgentClass::vehicle, {12, 0, 6}, 0, {14, 2, 1.5f});
@@ -177,7 +177,7 @@ TEST(Order, OfLevelsIsByHeight) {
   }
 }
 
-TEST(Order, StripsOfOneLevelGoByRankAndOthersByDepth) {
+TEST(Order, StripsOfOneLevelAreOrderedByRankAndOthersByDepth) {
   const Strip mark = strip_between({10, -2, 0}, {18, 2, 0}, StripKind::lane_mark, 0.5f);
   for (const float height_m : {-0.04f, 0.0f, 0.04f}) {
     // An edge that crosses the mark, slightly above or below it: the rank decides.
@@ -196,7 +196,7 @@ TEST(Order, StripsOfOneLevelGoByRankAndOthersByDepth) {
   }
 }
 
-TEST(Order, WhatStandsOnAStripIsInFrontOfItEvenWhereItDipsIn) {
+TEST(Order, ObjectsOnAStripAreInFrontEvenWherePartlyBelowIt) {
   // A road that falls by 15 % away from the camera, and a car upright on it: its near end lies 0.3 m below the road.
   const Strip mark = strip_between({10, 0, -1}, {20, 0, -2.5f});
   const AgentBox car = make_box(AgentClass::vehicle, {15, 0, -1.75f}, 0, {4, 2, 1.5f});
@@ -251,7 +251,7 @@ TEST(Order, FacesInOnePlaneAreOrderedByObject) {
   }
 }
 
-TEST(Order, AStripFromBelowIsHiddenByWhatIsTooNearToStandOnIt) {
+TEST(Order, AStripSeenFromBelowIsHiddenByObjectsThatDoNotStandOnIt) {
   ScreenFace strip = plane_face(make_object_id(kStripKind, 0), 0.02f);
   for (const auto& [above_eye_m, hiding] :
        {std::pair{-1.5f, 1.0f}, {2 * kThroughStrip_m, 2.0f}, {3 * kThroughStrip_m, 1.5f}}) {
@@ -293,7 +293,7 @@ TEST(Order, AWallStandsOnTheStripsThatItCrosses) {
   EXPECT_EQ(view.order(view.set_up(across), view.set_up(mark)), -1);
 }
 
-TEST(Order, StripsOfOneLevelAreOrderedByRankBeyondTheirHorizonToo) {
+TEST(Order, StripsOfOneLevelAreOrderedByRankBeyondTheirHorizon) {
   // Drawn 8 px wide, the strips extend above the horizon; the edge is nearer.
   const Strip edge = strip_between({20, 6, 0}, {20, -6, 0}, StripKind::road_edge),
               stop = strip_between({45, 6, 0}, {45, -6, 0}, StripKind::stop_line);
@@ -301,7 +301,7 @@ TEST(Order, StripsOfOneLevelAreOrderedByRankBeyondTheirHorizonToo) {
   EXPECT_EQ(view.order(view.set_up(stop), view.set_up(edge)), -1);
 }
 
-TEST(Order, AStripDrawnWiderThanItIsStaysAtItsDepth) {
+TEST(Order, AWidenedStripKeepsItsDepth) {
   // The strip's plane almost contains the eye: in that plane, half of the strip's width on screen would be much nearer,
   // and half beyond the horizon.
   const Strip strip = strip_between({40, -4, 0.9995f}, {45, 4, 0.9985f});
@@ -337,7 +337,7 @@ TEST(Order, ComparesAtTheCentroidOfTheSharedSamples) {
   EXPECT_EQ(centroid_of(0).x, 0.5f);
 }
 
-TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
+TEST(Order, IntersectingSolidsDivideSamplesByDepth) {
   std::mt19937_64 random(8);
   std::uniform_real_distribution<float> unit(0, 1);
   auto never = [](uint32_t, uint32_t) { return false; };
@@ -371,7 +371,7 @@ TEST(Order, SolidsThatIntersectShareSamplesByWhichIsNearer) {
   EXPECT_GT(tied, 2000);
 }
 
-TEST(Order, TwoFacesThatFillAPixelAndIntersectFillItTogether) {
+TEST(Order, TwoIntersectingFullFacesFillThePixelTogether) {
   // The first is in front in the left 5/8 of the pixel.
   const ScreenFace first = plane_face(make_object_id(kAgentKind, 0), 0.2f, {-0.08f, 0}),
                    second = plane_face(make_object_id(kAgentKind, 1), 0.15f);
@@ -385,7 +385,7 @@ TEST(Order, TwoFacesThatFillAPixelAndIntersectFillItTogether) {
   EXPECT_NEAR(sum.color().g, 3.0 / 8, 1e-5);
 }
 
-TEST(Order, FacesThatFillAPixelAndIntersectDivideWhatAThirdLeavesOfEach) {
+TEST(Order, IntersectingFullFacesDivideTheAreaLeftByAThirdFace) {
   // The first of the two is in front in the left 5/8 of the pixel; a third face hides the left half.
   const ScreenFace first = plane_face(make_object_id(kAgentKind, 0), 0.2f, {-0.08f, 0}),
                    second = plane_face(make_object_id(kAgentKind, 1), 0.15f);

@@ -43,7 +43,7 @@ TEST_F(FileTest, ErrorsNameThePath) {
   }
 }
 
-TEST_F(FileTest, AFolderThatCannotBeReachedIsAnErrorAndNoneForACache) {
+TEST_F(FileTest, AnUnreachableFolderIsAnErrorExceptForACache) {
   const std::string unreachable = folder_ / (std::string(300, 'x') + "/deeper");  // file systems end at 255
   EXPECT_EQ(test::message_of([&] { make_output_folder(unreachable); }),
             unreachable + ": cannot be created: File name too long");
@@ -93,7 +93,7 @@ TEST_F(FileTest, PngKeepsEveryPixel) {
   EXPECT_THROW(write_png(folder_ / "b.png", 5, 4, rgb), Error);
 }
 
-TEST_F(FileTest, AFifoIsReadToItsEndAndWaitingForItsWriterCanBeInterrupted) {
+TEST_F(FileTest, AFifoIsReadToItsEndAndItsWaitCanBeInterrupted) {
   const std::string path = folder_ / "fifo";
   ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
   std::thread writer([&] { std::ofstream(path) << std::string(200'000, 'x'); });
@@ -109,7 +109,7 @@ TEST_F(FileTest, AFifoIsReadToItsEndAndWaitingForItsWriterCanBeInterrupted) {
       testing::ExitedWithCode(0), "fifo: interrupted while it was read");
 }
 
-TEST_F(FileTest, WhatIsNoRegularFileIsNoCache) {
+TEST_F(FileTest, ACacheMustBeARegularFile) {
   const std::string fifo = folder_ / "fifo", device = folder_ / "device", file = folder_ / "file";
   ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
   std::filesystem::create_symlink("/dev/zero", device);
@@ -123,7 +123,7 @@ TEST_F(FileTest, WhatIsNoRegularFileIsNoCache) {
   EXPECT_TRUE(std::filesystem::is_fifo(fifo));
 }
 
-TEST_F(FileTest, TheHashOfAFileIsThatOfItsBytesAndNeedsAllOfThem) {
+TEST_F(FileTest, TheHashOfAFileIsThatOfAllItsBytes) {
   const std::string path = folder_ / "scene.bin", bytes(200'000, 'x');
   std::ofstream(path) << bytes;
   EXPECT_EQ(hash_of_file(path), fmt::format("{:016x}", hash_of(bytes)));

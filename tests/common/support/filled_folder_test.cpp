@@ -35,7 +35,7 @@ class FilledFolderTest : public testing::Test {
   test::ScratchFolder folder_;
 };
 
-TEST_F(FilledFolderTest, RemovesWhatEarlierCallsWroteAndNothingElse) {
+TEST_F(FilledFolderTest, RemovesOnlyFilesOfEarlierCalls) {
   write_file(folder_ / "mine.png", "mine");
   fill({"a.png", "b.png", "c.png"});
   fill({"b.png", "d.png"});
@@ -48,7 +48,7 @@ TEST_F(FilledFolderTest, RemovesWhatEarlierCallsWroteAndNothingElse) {
   EXPECT_EQ(read_file(folder_ / "b.png"), "ours") << "another kind of command";
 }
 
-TEST_F(FilledFolderTest, LeadsNowhereElse) {
+TEST_F(FilledFolderTest, WritesAndRemovesNothingOutsideTheFolder) {
   const test::ScratchFolder elsewhere;
   write_file(elsewhere / "mine", "mine");
   fs::create_symlink(elsewhere / "mine", folder_ / "link.png");

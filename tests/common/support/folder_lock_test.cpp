@@ -53,12 +53,12 @@ TEST_F(FolderLockTest, TheDeathOfItsProcessReleasesIt) {
   close(ready[1]);
 }
 
-TEST_F(FolderLockTest, AFolderThatIsNotThereIsNamed) {
+TEST_F(FolderLockTest, ErrorsNameAnAbsentFolder) {
   EXPECT_THAT(test::message_of([this] { FolderLock lock(folder_ / "none"); }),
               testing::HasSubstr("none/lock: cannot be opened"));
 }
 
-TEST_F(FolderLockTest, ALinkIsRefusedAndNothingIsWrittenWhereItLeads) {
+TEST_F(FolderLockTest, ALinkIsRefusedAndItsTargetUnchanged) {
   write_file(folder_ / "mine", "text");
   std::filesystem::create_symlink("mine", folder_ / "lock");
   EXPECT_EQ(refusal(), folder_.path() + "/lock: expected a file, got a link");

@@ -37,13 +37,13 @@ TEST_F(Interrupts, TheFirstSignalIsKept) {
 }
 
 // Each of several cooperating processes gets the signal from the others and, a moment later, directly.
-TEST_F(Interrupts, ASignalThatAnotherProcessHasToldOfIsTheSameRequest) {
+TEST_F(Interrupts, ASignalAnnouncedByAnotherProcessCountsOnce) {
   record_interrupt(SIGTERM);
   std::raise(SIGTERM);
   EXPECT_EQ(interrupting_signal(), SIGTERM);
 }
 
-TEST_F(Interrupts, WorkThatBeganBeforeIsStopped) {
+TEST_F(Interrupts, ASignalStopsOnlyWorkThatBeganBeforeIt) {
   const InterruptibleWork before("drawing was interrupted");
   EXPECT_NO_THROW(before.check());
   std::raise(SIGINT);

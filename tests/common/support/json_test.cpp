@@ -10,7 +10,7 @@ std::string nested(int depth, const std::string& inside = "") {
   return std::string(static_cast<size_t>(depth), '[') + inside + std::string(static_cast<size_t>(depth), ']');
 }
 
-TEST(Json, IsReadUpToItsDepth) {
+TEST(Json, DepthIsLimited) {
   EXPECT_EQ(parse_json(nested(kMaxJsonDepth, "1")).dump(), nested(kMaxJsonDepth, "1"));
   EXPECT_EQ(first_too_deep(nested(kMaxJsonDepth + 1)), static_cast<size_t>(kMaxJsonDepth));
   EXPECT_THROW(parse_json(nested(kMaxJsonDepth + 1)), Json::parse_error);
@@ -23,7 +23,7 @@ TEST(Json, IsReadUpToItsDepth) {
   EXPECT_EQ(first_too_deep("[\"" + brackets + "\\\"" + brackets + "\\\\\"]"), std::string_view::npos);
 }
 
-TEST(Json, WhatIsNoneIsTheLibrarysError) {
+TEST(Json, InvalidTextIsAParseError) {
   for (const char* text : {"", "[", "]", "{]", "[1,]", "nul", "\"\\"}) {
     EXPECT_THROW(parse_json(text), Json::parse_error) << text;
     EXPECT_TRUE(parse_json(text, /*allow_exceptions=*/false).is_discarded()) << text;

@@ -53,12 +53,12 @@ TEST(Numbers, FractionsAreDecimalAndFinite) {
   }
 }
 
-TEST(Numbers, WhatIsMeantAsANumberIsKnownFromItsBeginning) {
+TEST(Numbers, IntendedNumbersAreRecognizedByTheirStart) {
   for (const char* text : {"0x10", "1_000", "-.5x", "+3"}) EXPECT_TRUE(looks_like_number(text)) << text;
   for (const char* text : {"cpu", "", "-", "nan", "--1"}) EXPECT_FALSE(looks_like_number(text)) << text;
 }
 
-TEST(Numbers, MessagesHaveNoEndlessDigits) {
+TEST(Numbers, MessagesHaveAtMost15Digits) {
   EXPECT_EQ(text_of_number(0.1), "0.1");
   EXPECT_EQ(text_of_number(2147483647), "2147483647");
   EXPECT_EQ(text_of_number(std::numeric_limits<double>::max()), "1.79769313486232e+308");

@@ -40,7 +40,7 @@ class OutputFileTest : public testing::TestWithParam<Staging> {
 INSTANTIATE_TEST_SUITE_P(, OutputFileTest, testing::Values(Staging::unnamed, Staging::named),
                          [](const auto& each) { return each.param == Staging::unnamed ? "Unnamed" : "Named"; });
 
-TEST_P(OutputFileTest, ReplacesTheOldFileOnlyWhenItIsCommitted) {
+TEST_P(OutputFileTest, ReplacesTheOldFileOnlyOnCommit) {
   const std::string path = folder_ / "a.txt";
   put(path, "old");
   {
@@ -54,7 +54,7 @@ TEST_P(OutputFileTest, ReplacesTheOldFileOnlyWhenItIsCommitted) {
   EXPECT_EQ(folder_.num_entries(), 1u);
 }
 
-TEST_P(OutputFileTest, FollowsLinksToWhatIsThereAndToWhatIsNot) {
+TEST_P(OutputFileTest, FollowsLinksToExistingAndAbsentFiles) {
   fs::create_directory(folder_ / "deeper");
   put(folder_ / "deeper/target", "old");
   fs::create_symlink("deeper/target", folder_ / "link");
@@ -70,7 +70,7 @@ TEST_P(OutputFileTest, FollowsLinksToWhatIsThereAndToWhatIsNot) {
   EXPECT_THAT(test::message_of([&] { put(folder_ / "circle", "x"); }), HasSubstr("circle: cannot be written"));
 }
 
-TEST_P(OutputFileTest, WritesThroughDevicesAndFifosWhichStayWhatTheyAre) {
+TEST_P(OutputFileTest, WritesToDevicesAndFifosWithoutReplacingThem) {
   EXPECT_EQ(test::message_of([&] { put("/dev/full", "x"); }), "/dev/full: cannot be written: No space left on device");
   put("/dev/null", "x");
   EXPECT_TRUE(fs::is_character_file("/dev/full"));
@@ -88,7 +88,7 @@ TEST_P(OutputFileTest, WritesThroughDevicesAndFifosWhichStayWhatTheyAre) {
   EXPECT_EQ(folder_.num_entries(), 2u);
 }
 
-TEST_P(OutputFileTest, WritesThroughDescriptorsWhereverTheyAre) {
+TEST_P(OutputFileTest, WritesToDescriptorPaths) {
   const std::string path = folder_ / "redirected";
   put(path, "0123456789");
   const Descriptor file(::open(path.c_str(), O_RDWR));
@@ -108,7 +108,7 @@ TEST_P(OutputFileTest, WritesThroughDescriptorsWhereverTheyAre) {
   EXPECT_EQ(folder_.num_entries(), 2u);
 }
 
-TEST_P(OutputFileTest, KeepsTheModeOfWhatItReplacesAndRefusesWhatIsReadOnly) {
+TEST_P(OutputFileTest, KeepsTheFileModeAndRefusesReadOnlyFiles) {
   const std::string path = folder_ / "a.txt";
   put(path, "old");
   for (const fs::perms mode : {fs::perms(0640), fs::perms(0777), fs::perms(0600)}) {
@@ -121,7 +121,7 @@ TEST_P(OutputFileTest, KeepsTheModeOfWhatItReplacesAndRefusesWhatIsReadOnly) {
   EXPECT_EQ(read_file(path), "new");
 }
 
-TEST_P(OutputFileTest, NamesTheVariableThatNamesNoFolderForTemporaryFiles) {
+TEST_P(OutputFileTest, ErrorsNameTheVariableOfTheTemporaryFolder) {
   const test::EnvironmentVariable folder("TMPDIR", folder_ / "missing");
   EXPECT_EQ(test::message_of([&] { put("/dev/null", "x"); }),
             "/dev/null: cannot be written: expected $TMPDIR to name a folder for temporary files: No such file or "
@@ -129,7 +129,7 @@ TEST_P(OutputFileTest, NamesTheVariableThatNamesNoFolderForTemporaryFiles) {
   put(folder_ / "a.txt", "x");
 }
 
-TEST_P(OutputFileTest, RemovesNoFileOfAUsers) {
+TEST_P(OutputFileTest, RemovesNoUserFile) {
   const std::vector<std::string> names{".a.txt.backup.tmp", ".a.txt.1.0.tmp", ".pictura-notes.tmp",
                                        ".pictura-0123456789abcdeg.tmp"};
   for (const std::string& name : names) std::ofstream(folder_ / name) << "mine";
@@ -138,7 +138,7 @@ TEST_P(OutputFileTest, RemovesNoFileOfAUsers) {
   EXPECT_EQ(folder_.num_entries(), names.size() + 2);
 }
 
-TEST_P(OutputFileTest, RefusesFoldersAndNamesWhatCannotBeWritten) {
+TEST_P(OutputFileTest, RefusesFoldersAndNamesUnwritablePaths) {
   EXPECT_EQ(test::message_of([&] { put(folder_.path(), "x"); }),
             folder_.path() + ": cannot be written: expected a file, got a folder");
   EXPECT_EQ(test::message_of([&] { put("/proc/nowhere/a", "x"); }),
@@ -146,7 +146,7 @@ TEST_P(OutputFileTest, RefusesFoldersAndNamesWhatCannotBeWritten) {
   EXPECT_THAT(test::message_of([&] { put("", "x"); }), HasSubstr("empty"));
 }
 
-TEST_P(OutputFileTest, WhatDoesNotFitKeepsTheOldFile) {
+TEST_P(OutputFileTest, AFullDiskKeepsTheOldFile) {
   const std::string path = folder_ / "a.txt";
   put(path, "old");
   const pid_t child = ::fork();
@@ -164,7 +164,7 @@ TEST_P(OutputFileTest, WhatDoesNotFitKeepsTheOldFile) {
   EXPECT_EQ(folder_.num_entries(), 1u);
 }
 
-TEST_P(OutputFileTest, AKilledWriterLeavesNothingAfterTheNextAndAnotherOneAtWorkIsLeftAlone) {
+TEST_P(OutputFileTest, RemovesFilesOfKilledWritersButNotOfActiveWriters) {
   const std::string path = folder_ / "a.txt";
   const pid_t child = ::fork();
   if (child == 0) {

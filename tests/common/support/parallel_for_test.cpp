@@ -37,7 +37,7 @@ TEST(ParallelFor, RethrowsTheLowestItemsException) {
   }
 }
 
-TEST(ParallelFor, NumbersThreadsThatWorkAtOnce) {
+TEST(ParallelFor, GivesConcurrentThreadsDifferentNumbers) {
   constexpr int kThreads = 4;
   std::vector<std::atomic<int>> at_work(kThreads);
   std::atomic<int> twice = 0;
@@ -51,7 +51,7 @@ TEST(ParallelFor, NumbersThreadsThatWorkAtOnce) {
   EXPECT_EQ(twice, 0);
 }
 
-TEST(ParallelFor, TakesNoMoreThreadsThanItems) {
+TEST(ParallelFor, UsesNoMoreThreadsThanItems) {
   std::thread::id only;
   parallel_for(4, 1, [&](std::int64_t, int thread) {
     EXPECT_EQ(thread, 0);
@@ -62,7 +62,7 @@ TEST(ParallelFor, TakesNoMoreThreadsThanItems) {
   parallel_for(4, 0, [](std::int64_t) { FAIL(); });
 }
 
-TEST(ParallelFor, RunsLoopsInItsBodiesAndInOtherThreads) {
+TEST(ParallelFor, RunsNestedAndConcurrentLoops) {
   std::atomic<int> visits = 0;
   const auto run = [&] {
     parallel_for(3, 10, [&](std::int64_t) {

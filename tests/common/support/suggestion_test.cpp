@@ -6,7 +6,7 @@
 namespace pictura {
 namespace {
 
-TEST(Suggestion, IsTheNearestWordAndNoneThatIsFar) {
+TEST(Suggestion, IsTheNearestWordWithinADistance) {
   const std::vector<std::string> known{"train.updates", "train.update_epochs", "evaluate", "--config", "Town01",
                                        "Town02"};
   EXPECT_EQ(nearest_word("train.updats", known), "train.updates");
