@@ -40,14 +40,14 @@ TEST(Config, DefaultsAreThePapersTables) {
   EXPECT_TRUE(c.simulator.conditioning[static_cast<size_t>(Conditioning::acceleration)].mixture);
 }
 
-TEST(Config, PaperFileSaysNothingElseThanTheDefaults) {
+TEST(Config, PaperFileEqualsTheDefaults) {
   const Config paper = load_config(PICTURA_SOURCE_DIR "/configs/paper.toml");
   EXPECT_EQ(first_difference(Config{}, paper), "");
   EXPECT_EQ(to_toml(paper), to_toml(Config{}));
 }
 
 // Rows are "| `key` | default | values | meaning |"; the first three come from the list of keys.
-TEST(Config, TheDocumentNamesEveryKeyWithItsDefaultAndRangeAndNoOther) {
+TEST(Config, TheReferenceListsExactlyTheKeysDefaultsAndRanges) {
   const std::string document = read_file(PICTURA_SOURCE_DIR "/docs/reference/configuration.md");
   size_t rows = 0;
   for (const ConfigKey& key : config_keys()) {
@@ -74,7 +74,7 @@ TEST(Config, NumbersMayBeWrittenInAnyDecimalNotation) {
   }
 }
 
-TEST(Config, RecordedScenesHaveSettingsOfTheirOwn) {
+TEST(Config, RecordedScenesHaveTheirOwnSettings) {
   const auto config_of = [](const std::string& maps, const std::vector<std::string>& more = {}) {
     std::vector<std::string> overrides = more;
     overrides.push_back("simulator.maps=[" + maps + "]");
@@ -123,7 +123,7 @@ TEST(Config, KeysCanBeUnsetAndARigReplacesTheSizesOfTheFile) {
   EXPECT_THAT(error_in(text, {"render.rig=a.toml", "render.width_px=8"}), HasSubstr("has no effect together"));
 }
 
-TEST(Config, PathsAreRelativeToWhereTheyAreTyped) {
+TEST(Config, PathsAreRelativeToTheirFileOrWorkingFolder) {
   const test::ScratchFolder folder;
   const std::string path = folder / "a.toml";
   write_file(path, "[simulator]\nmaps = [\"towns/a.xodr\", \"Town01\"]\n[render]\nrig = \"../rig.toml\"\n");
@@ -138,7 +138,7 @@ TEST(Config, PathsAreRelativeToWhereTheyAreTyped) {
   EXPECT_EQ(anywhere.render.rig, (std::filesystem::current_path() / "b.toml").string());
 }
 
-TEST(Config, SettingsWithoutEffectAreSaid) {
+TEST(Config, SettingsWithoutEffectAreReported) {
   EXPECT_THAT(error_in("[simulator]\nnum_slots = 4\nmin_agents = 8\nmax_agents = 8\n"),
               HasSubstr("simulator.min_agents: expected at most simulator.num_slots (4), got 8"));
   Config config;
@@ -176,7 +176,7 @@ TEST(Config, WrittenTextReadsBackEqual) {
   EXPECT_EQ(back.simulator.conditioning[0].low, 3.3f);
 }
 
-TEST(Config, OverridesWinAndMayNameNewKeysAndBareWords) {
+TEST(Config, OverridesTakePrecedenceAndAcceptNewKeysAndBareWords) {
   const Config c = parse_config(
       "[train]\nupdates = 5\n", "a.toml",
       {"train.updates=2", "run.device=cpu", "simulator.conditioning.collision=[1, 2]", "simulator.maps=[\"Town01\"]"});
@@ -219,7 +219,7 @@ TEST(Config, ErrorsNameFileLineAndKey) {
 }
 
 // By default images are 96x54 in patches of 4.
-TEST(Config, PatchesGrowAsImagesDo) {
+TEST(Config, PatchesScaleWithImages) {
   const auto error_of = [](const std::string& schedule, const std::string& more = "") {
     return error_in(fmt::format("[render]\nschedule = {}\n{}", schedule, more));
   };
@@ -237,7 +237,7 @@ TEST(Config, PatchesGrowAsImagesDo) {
   EXPECT_THAT(error_of("[[5, 192, 108, 8, 1]]", "[policy]\nbackbone = \"vit.pt\"\n"), HasSubstr("policy.backbone"));
 }
 
-TEST(Config, TheScheduleSaysWhatIsInForce) {
+TEST(Config, TheScheduleGivesTheCurrentImageSettings) {
   Config c;
   c.render.schedule = {{10, 192, 108, 8, 0.7}, {20, 64, 36}};
   const auto images_at = [&c](int64_t agent_steps) {
@@ -285,7 +285,7 @@ TEST(Config, KeysWithoutEffectAreRefused) {
   EXPECT_EQ(to_toml(parse_config(to_toml(c), "b.toml")), to_toml(c));
 }
 
-TEST(Config, RemovedKeysAreReadWithTheirOneValueAlone) {
+TEST(Config, RemovedKeysAcceptOnlyTheirFixedValue) {
   const std::string kept =
       "[simulator.dynamics]\nforbid_reversing = false\n[policy]\ngoal_features = false\ncritic_layers = 0\nvalue_head "
       "= 'linear'\n";
@@ -303,7 +303,7 @@ TEST(Config, RemovedKeysAreReadWithTheirOneValueAlone) {
       HasSubstr("a.toml:2: simulator.dynamics.forbid_reversing: expected false, got true: the rule was removed"));
 }
 
-TEST(Config, BackendsAreCheckedWhereTheyAreRead) {
+TEST(Config, BackendsAreCheckedWhenAFileIsRead) {
   const std::string text = "[run]\ndevice = \"cuda:1\"\n[simulator]\nbackend = \"cpu\"\n[render]\nbackend = \"null\"\n";
   const Config c = parse_config(text, "a.toml");
   EXPECT_EQ(c.run.device, "cuda:1");
@@ -321,7 +321,7 @@ TEST(Config, BackendsAreCheckedWhereTheyAreRead) {
   EXPECT_EQ(parse_saved_config("[render]\nbackend = \"vulkan\"\n", "a.ckpt").render.backend, "vulkan");
 }
 
-TEST(Config, SamplesAreNumbersOrGridsAndOfGlAlone) {
+TEST(Config, SamplesAreNumbersOrGridsForGlOnly) {
   const std::vector<std::string> gl{"render.backend=gl"};
   auto samples_of = [&](const std::string& value) {
     return parse_saved_config("[render]\nbackend = \"gl\"\nsamples = " + value + "\n", "a.toml").render.samples;
@@ -335,7 +335,7 @@ TEST(Config, SamplesAreNumbersOrGridsAndOfGlAlone) {
               AllOf(HasSubstr("a.toml:3: render.samples"), HasSubstr("only gl")));
 }
 
-TEST(Config, TheOldNameOfTheBackendsFillsInWhichIsAbsent) {
+TEST(Config, TheOldBackendKeyIsTheDefaultOfNewKeys) {
   auto backends = [](const std::string& text) {
     const Config c = parse_saved_config(text, "a.toml");
     return c.simulator.backend + " " + c.render.backend;
@@ -351,7 +351,7 @@ TEST(Config, TheOldNameOfTheBackendsFillsInWhichIsAbsent) {
               AllOf(HasSubstr("a.toml:2: run.backend"), HasSubstr("no effect")));
 }
 
-TEST(Config, WhatCannotWorkInOneMemoryIsRefusedByName) {
+TEST(Config, ErrorsNameBackendsInDifferentMemories) {
   const auto message = [](const char* device, const char* simulator, const char* renderer) {
     Config c;
     c.run.device = device;
@@ -427,7 +427,7 @@ TEST(Config, DifferencesThatChangeTheRunAreNamed) {
   EXPECT_EQ(first_difference(a, b), "simulator.light_heads: 'as_mapped' became 'visible'");
 }
 
-TEST(Config, RangesOfTownsAreExpandedAndCopiesAreOfEachMap) {
+TEST(Config, RangesOfTownsAreExpandedAndEachMapIsCopied) {
   const auto with = [](const std::vector<std::string>& overrides) {
     return parse_config(
         "[simulator]\nmaps = [\"Town01\", \"procedural:8-9\"]\nnum_slots = 40\nmin_agents = 4\n"
@@ -453,7 +453,7 @@ TEST(Config, RangesOfTownsAreExpandedAndCopiesAreOfEachMap) {
               AllOf(HasSubstr("simulator.maps"), HasSubstr("'procedural:9-8'")));
 }
 
-TEST(Config, HarmlessDifferencesAreNone) {
+TEST(Config, HarmlessDifferencesAreIgnored) {
   Config a, b;
   b.train.updates = 3;
   b.train.checkpoint_every = 7;
@@ -487,7 +487,7 @@ TEST(Config, MessagesShowValuesInOneShortLine) {
   EXPECT_LT(message.size(), 160u);
 }
 
-TEST(Config, ConditioningOfAnEvaluationIsReadAndRefusedUnderItsOption) {
+TEST(Config, ErrorsInEvaluationConditioningNameItsOption) {
   const Config config = with_evaluate_conditioning(Config{}, {"collision=1e0", "center_bias_m=-0.25"});
   EXPECT_EQ(config.evaluate.conditioning[static_cast<size_t>(Conditioning::collision)], 1);
   EXPECT_EQ(config.evaluate.conditioning[static_cast<size_t>(Conditioning::center_bias_m)], -0.25);
@@ -519,7 +519,7 @@ TEST(Config, LightCyclesAreReadByTheirNames) {
             "light_cycles: expected phases, independent, got 'alone'");
 }
 
-TEST(Config, StaggeringIsOfTrainingAloneAndDynamicsOfEveryWorld) {
+TEST(Config, StaggeringAffectsOnlyTrainingAndDynamicsAffectAllWorlds) {
   const Config c =
       parse_config("[simulator.dynamics]\nreset_at_standstill = true\n[train]\nstagger_episodes = true\n", "a.toml");
   const SimulatorConfig training = simulator_config(c), evaluation = evaluation_simulator_config(c, 9);
@@ -536,7 +536,7 @@ TEST(Config, StaggeringIsOfTrainingAloneAndDynamicsOfEveryWorld) {
   EXPECT_EQ(first_difference(Config{}, slow), "train.stagger_episodes: false became true");
 }
 
-TEST(Config, ImpairedAgentsAreOfTrainingAlone) {
+TEST(Config, ImpairedAgentsAffectOnlyTraining) {
   const Config c =
       parse_config("[simulator.others]\nblind = 0.05\nphantom_braking = 0.1\ninattentive = 0.2\n", "a.toml");
   const OtherShares expected{.blind = 0.05f, .phantom_braking = 0.1f, .inattentive = 0.2f};
@@ -552,7 +552,7 @@ TEST(Config, ImpairedAgentsAreOfTrainingAlone) {
       HasSubstr("simulator.others: expected shares that sum to less than 1, since the other agents learn, got 1"));
 }
 
-TEST(Config, EvaluationFixesConditioningAndLightsAndEndsNothingEarly) {
+TEST(Config, EvaluationFixesConditioningAndLightsAndDisablesEarlyResets) {
   const SimulatorConfig s = evaluation_simulator_config(Config{}, 3000);
   EXPECT_EQ(s.episode_steps, 3000);
   EXPECT_GT(s.reset_inactive_fraction, 1.0f);
