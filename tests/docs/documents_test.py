@@ -1,4 +1,4 @@
-"""The documents against the program: the reference of commands, examples, keys, and completion.
+"""Comparison of the documents with the program: the reference of commands, examples, keys, and completion.
 
 Run by ctest: python3 documents_test.py PICTURA [unittest arguments].
 """
@@ -53,7 +53,7 @@ class Documents(unittest.TestCase):
             if word.startswith("--"):
                 self.assertIn(word.split("=")[0], self.options(command) | {"--help", "--version"}, f"pictura {line}")
 
-    def test_the_reference_of_commands_is_what_help_prints(self):
+    def test_the_command_reference_matches_help(self):
         if not self.is_whole:
             self.skipTest("this build lacks commands")
         # Later versions of CLI11 format options differently: `[0]` instead of `=0`.
@@ -63,7 +63,7 @@ class Documents(unittest.TestCase):
         found = commands.differences(commands.pages_of(self.helps.items()))
         self.assertEqual(found, [], "run scripts/docs --update\n" + "".join(found))
 
-    def test_every_command_has_three_examples_that_name_what_there_is(self):
+    def test_every_command_has_three_examples_of_existing_names(self):
         for command, text in self.helps.items():
             with self.subTest(" ".join(command)):
                 examples = [line for line in text.splitlines() if re.match(r"  (.* )?(\w+=\S+ )?\S*pictura |  source <\(pictura ", line)]
@@ -83,7 +83,7 @@ class Documents(unittest.TestCase):
                 count += 1
         self.assertGreater(count, 40)
 
-    def test_keys_that_documents_set_are_keys(self):
+    def test_keys_in_documents_exist(self):
         known = set(re.findall(r"^\| `([\w.]+)`", (ROOT / "docs/reference/configuration.md").read_text(), re.MULTILINE))
         count = 0
         for path in documents():
@@ -119,7 +119,7 @@ class Completion(unittest.TestCase):
             self.assertEqual(self.bash("pictura", "train", "--set", "train.gae"), ["train.gae_lambda="])
             self.assertEqual(self.bash("pictura", "evaluate", "--map", "city"), ["city:1"])
 
-    def test_zsh_and_fish_take_their_scripts(self):
+    def test_zsh_and_fish_accept_their_scripts(self):
         shells = [shell for shell in ("zsh", "fish") if shutil.which(shell)]
         if not shells:
             self.skipTest("needs zsh or fish")

@@ -49,7 +49,7 @@ def shorter(line):
 
 
 class Tutorials(unittest.TestCase):
-    def test_every_command_does_what_it_says(self):
+    def test_every_tutorial_command_runs(self):
         folder = pathlib.Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, folder)
         for name in ("configs", "models"):

@@ -179,7 +179,7 @@ def report():
 
 
 class Rules(unittest.TestCase):
-    """Each rule finds what it is for."""
+    """Each rule finds the violations that it describes."""
 
     def rules(self, text, **options):
         return sorted({rule for _, rule, _ in violations(text, **options)})
@@ -243,7 +243,7 @@ class Comments(unittest.TestCase):
 class Pages(unittest.TestCase):
     maxDiff = 0  # the messages list the violations
 
-    def test_pages_keep_the_rules(self):
+    def test_pages_follow_the_rules(self):
         found = [line for path in pages.documents() for line in page_violations(path)]
         rules = collections.Counter(line.rsplit("[", 1)[1].rstrip("]") for line in found)
         self.assertEqual(found, [], "\n" + "\n".join([*found, f"violations by rule: {dict(rules)}"]))

@@ -106,7 +106,7 @@ TEST(WorldPainter, DrawsABoxAtItsPosition) {
   EXPECT_NEAR(wide_px, 20, 2);
 }
 
-TEST(WorldPainter, MarksCoverWhatIsThere) {
+TEST(WorldPainter, MarksCoverEarlierDrawing) {
   WorldPainter painter(town(), 300, 300);
   const std::vector<AgentBox> agents{box(500, 400, 0)};
   const std::vector<WorldMark> marks{{{499, 400}, rgb8(1, 2, 3), ""}, {{500, 404}, rgb8(4, 5, 6), "a"}};
@@ -204,7 +204,7 @@ TEST(WorldPainter, DrawsWalls) {
   EXPECT_EQ(at(image, 320, 150), kGround) << "beyond its end";
 }
 
-TEST(WorldPainter, LinesLeadToGoals) {
+TEST(WorldPainter, LinesConnectAgentsAndGoals) {
   WorldPainter painter(town(), 400, 300);
   const std::vector<AgentBox> agents{box(500, 400, 0)};
   const std::vector<AgentGoal> goals{{0, {500, 410}}};
@@ -282,7 +282,7 @@ TEST(WorldPainter, LightsShowTheirState) {
   EXPECT_THAT(test::message_of([&] { painter.draw(frame, painter.whole_map()); }), HasSubstr("1 lights, got 2"));
 }
 
-TEST(WorldPainter, WaysOfARecordingLieOnTheGroundAndBoxesOverThem) {
+TEST(WorldPainter, RecordedPathsAreDrawnBelowBoxes) {
   const std::shared_ptr<const Scenario> scene = test::crossing();
   WorldPainter bare(scene->map, 500, 500), painter(scene->map, 500, 500, {}, scene.get());
   const TopCamera camera = painter.whole_map();
@@ -524,7 +524,7 @@ TEST(DrawMap, RejectsEmptyParts) {
   EXPECT_THAT(message({0, 500, 900, 515}), HasSubstr("which lies in (998, 496) to (1102, 500)"));
 }
 
-TEST(DrawMap, RejectsWhatCannotBeDrawn) {
+TEST(DrawMap, RejectsInvalidSizesMapsAndPaths) {
   EXPECT_THROW(draw_map(town(), {.size_px = 63}), Error);
   EXPECT_THROW(draw_map(town(), {.size_px = 20000}), Error);
   EXPECT_THAT(test::message_of([] { draw_map(RoadMap{}, {.size_px = 300}); }), HasSubstr("nothing to draw"));
@@ -562,7 +562,7 @@ TEST(ContactSheet, EnlargesEveryPixelWithoutSmoothing) {
   EXPECT_THROW(contact_sheets(images, rig, {}), Error);
 }
 
-TEST(ContactSheet, GoesOnOnFurtherPagesAndRowsWhereThereIsNoRoom) {
+TEST(ContactSheet, ContinuesOnMoreRowsAndPages) {
   const Rig rig = paper_rig(96, 54);
   std::vector<std::string> names;
   for (int view = 0; view < 80; ++view) names.push_back(std::to_string(view));
@@ -591,7 +591,7 @@ TEST(ContactSheet, GoesOnOnFurtherPagesAndRowsWhereThereIsNoRoom) {
   EXPECT_GT(sheet[0].height_px, 3 * 2);
 }
 
-TEST(Interrupts, EndDrawingsButNotThoseThatBeginAfterwards) {
+TEST(Interrupts, EndRunningDrawingsButNotLaterOnes) {
   EXPECT_EXIT(
       {
         catch_interrupts();
@@ -757,7 +757,7 @@ TEST(Video, RejectsBadPathsAndFrames) {
   EXPECT_FALSE(has_children());
 }
 
-TEST(Video, ReportsThatFfmpegIsMissing) {
+TEST(Video, ReportsAMissingFfmpeg) {
   const ScratchFolder folder, empty;
   const EnvironmentVariable path("PATH", empty.path());
   const std::string message = test::message_of([&] { VideoWriter(folder / "film.mp4", 64, 48, 10); });
@@ -771,7 +771,7 @@ void write_ffmpeg(const ScratchFolder& programs, const std::string& lines) {
   fs::permissions(programs / "ffmpeg", fs::perms::owner_all);
 }
 
-TEST(Video, ReportsAnFfmpegThatWritesNothing) {
+TEST(Video, ReportsAnFfmpegWithoutOutput) {
   const ScratchFolder folder, programs;
   write_ffmpeg(programs, "while read -r line; do :; done\n");
   const EnvironmentVariable path("PATH", programs.path());

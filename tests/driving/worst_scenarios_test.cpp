@@ -15,7 +15,7 @@ ScenarioCounts counts(int64_t infractions, int64_t at_fault, double distance_m) 
   return result;
 }
 
-TEST(WorstScenarios, AreByInfractionsThenCollisionsAtFaultThenHowLittleWasDriven) {
+TEST(WorstScenarios, AreOrderedByInfractionsThenFaultThenDistance) {
   EvaluationResults results;
   results.densities.push_back({"light", 10, 5, {counts(2, 1, 900), counts(2, 2, 900), counts(3, 0, 900)}});
   results.densities.push_back({"dense", 10, 5, {counts(2, 1, 400), counts(0, 0, 0)}});

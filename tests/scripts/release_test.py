@@ -39,7 +39,7 @@ class Workflows(unittest.TestCase):
             self.skipTest("needs actionlint")
         self.assertEqual(run("actionlint", *WORKFLOWS), (0, ""))
 
-    def test_run_scripts_that_there_are(self):
+    def test_run_existing_scripts(self):
         named = set()
         for path in WORKFLOWS:
             for command in re.findall(r"run: (.*)", path.read_text()):
@@ -48,7 +48,7 @@ class Workflows(unittest.TestCase):
         for name in named:
             self.assertTrue((ROOT / name).is_file(), name)
 
-    def test_are_on_pull_requests_and_tags(self):
+    def test_run_on_pull_requests_and_tags(self):
         triggers = {path.stem: path.read_text().split("\njobs:")[0] for path in WORKFLOWS}
         self.assertEqual({name for name, text in triggers.items() if "pull_request:" in text}, {"build", "site"})
         self.assertIn("tags:", triggers["wheels"])
@@ -60,14 +60,14 @@ class Images(unittest.TestCase):
             self.skipTest("needs hadolint")
         self.assertEqual(run("hadolint", *DOCKERFILES), (0, ""))
 
-    def test_are_built_of_packages_that_scripts_setup_installs(self):
+    def test_install_the_packages_of_scripts_setup(self):
         listed = re.search(r"--no-install-recommends \\\n(.*?)>/dev/null", (ROOT / "docker/build_wheel").read_text(), re.DOTALL)[1]
         packages = set(listed.replace("\\", "").split())
         self.assertGreater(len(packages), 10)
         setup = re.search(r"^packages=\((.*?)^\)", (ROOT / "scripts/setup").read_text(), re.DOTALL | re.MULTILINE)[1]
         self.assertLessEqual(packages, set(setup.split()))
 
-    def test_are_built_as_their_page_says(self):
+    def test_build_commands_match_their_page(self):
         builds = re.findall(r"docker build -f (\S+) (.*) \.$", (ROOT / "docs/how-to/docker.md").read_text(), re.MULTILINE)
         self.assertEqual({file for file, _ in builds}, {"docker/cpu.Dockerfile", "docker/gpu.Dockerfile"})
         for file, options in builds:
@@ -75,7 +75,7 @@ class Images(unittest.TestCase):
             for name in re.findall(r"--build-arg (\w+)=", options):
                 self.assertIn(name, arguments)
 
-    def test_take_what_there_is(self):
+    def test_use_existing_scripts_and_paths(self):
         for path in DOCKERFILES:
             text = path.read_text()
             for script in re.findall(r"^RUN /src/(\S+)", text, re.MULTILINE):

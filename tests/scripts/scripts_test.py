@@ -73,7 +73,7 @@ class Help(Scratch):
     def assert_nothing_was_done(self):
         self.assertEqual(sorted(path.name for path in self.root.iterdir()), ["bin", "scripts"])
 
-    def test_it_is_found_from_any_folder_and_does_nothing_else(self):
+    def test_help_works_from_any_folder_and_has_no_side_effects(self):
         self.assertGreater(len(self.SHELL), 10)
         for name in self.EXECUTABLE:
             if name in self.NEEDS_TORCH:
@@ -87,14 +87,14 @@ class Help(Scratch):
                     self.assertGreater(len(result.stdout.splitlines()), 1)
                     self.assert_nothing_was_done()
 
-    def test_of_a_shell_script_it_is_the_comment_at_its_beginning(self):
+    def test_help_of_a_shell_script_is_its_head_comment(self):
         for name in self.SHELL:
             with self.subTest(name):
                 comment = (SCRIPTS / name).read_text().partition("\nset ")[0].splitlines()[1:]
                 help_lines = self.run_script(name, "--help").stdout.splitlines()
                 self.assertEqual(help_lines, [line.removeprefix("#").removeprefix(" ") for line in comment])
 
-    def test_what_a_shell_script_does_not_know_is_refused_before_it_does_anything(self):
+    def test_shell_scripts_refuse_unknown_arguments_first(self):
         unknown = [(name, "--bogus") for name in self.SHELL if name not in self.PASSES_OPTIONS_ON]
         more = [("demo", "--seed", "3", "extra"), ("demo", "out", "extra"), ("demo", "--seeds", "2", "out", "extra"), ("figures", "a", "b"),
                 ("film", "a", "b"), ("python_stubs", "a", "b"), ("setup", "--cpu", "a"), ("gpu_carry", "a"), ("format", "--check", "a")]  # fmt: skip
@@ -129,7 +129,7 @@ class Format(Scratch):
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         return sorted((self.root / "formatted").read_text().splitlines())
 
-    def test_names_may_be_any_and_what_was_deleted_is_left_out(self):
+    def test_all_file_names_are_supported_and_deleted_files_skipped(self):
         if shutil.which("git") is None:
             self.skipTest("needs git")
         self.git("init")
@@ -141,7 +141,7 @@ class Format(Scratch):
         (self.root / "gone.cpp").unlink()
         self.assertEqual(self.formatted(), ["Stra\u00dfe.h", "a.cpp", "two words.cu", "untracked.cuh"])
 
-    def test_without_a_checkout_it_skips(self):
+    def test_formatting_is_skipped_without_a_checkout(self):
         result = self.run_script("format", "--check", GIT_DIR=str(self.root / "none"))
         self.assertEqual(result.returncode, 77)
         self.assertIn("not a git checkout", result.stderr)
@@ -169,7 +169,7 @@ class Carry(Scratch):
     def names(self):
         return sorted(str(path.relative_to(self.root / "carry")) for path in (self.root / "carry").rglob("*") if path.is_file())
 
-    def test_what_is_fetched_takes_the_place_of_what_was_there(self):
+    def test_fetched_files_replace_existing_files(self):
         self.assertEqual(self.names(), ["debs/first.deb", "maps/carla/first.xodr.gz", "wheels/first.whl"])
         for name in ("root/unpacked", "bin/pictura", "maps/mine.xodr", "new/of_a_killed_call"):
             self.write(f"carry/{name}", "")
@@ -178,7 +178,7 @@ class Carry(Scratch):
         fetched = ["debs/second.deb", "maps/carla/second.xodr.gz", "wheels/second.whl"]
         self.assertEqual(self.names(), sorted([*fetched, "bin/pictura", "maps/mine.xodr"]))
 
-    def test_a_call_that_fails_leaves_what_was_there(self):
+    def test_a_failed_call_keeps_existing_files(self):
         self.write("carry/root/unpacked", "")
         before = self.names()
         self.assertEqual(self.fetch("second", pip="exit 5").returncode, 5)
@@ -223,7 +223,7 @@ class Lanes(OnADevice):
         with tarfile.open(whole) as tar:
             return {member.name for member in tar if member.isfile()}
 
-    def test_a_lane_that_fails_sets_the_status_and_ends_only_its_own_work(self):
+    def test_a_failing_lane_sets_the_status_and_ends_only_itself(self):
         status, said, _ = self.work("0 good 1 true", "1 bad 1 sh -c 'echo wrong >&2; exit 7'", "1 after 1 true", "0 last 1 true")
         self.assertEqual(status, 1)
         self.assertIn("GPU 1: bad has failed: wrong", said)
@@ -231,14 +231,14 @@ class Lanes(OnADevice):
         self.assertEqual(self.work("0 good 1 true", "1 bad 1 true")[0], 0)
         self.assertIn("runs/lanes/bad.done", self.packed())
 
-    def test_a_single_lane_that_fails_sets_it_too(self):
+    def test_a_failing_single_lane_sets_the_status(self):
         for command in ("false", "sh -c 'exit 124'", "no_such_command", "pictura train wrong", "pictura"):
             with self.subTest(command):
                 status, said, _ = self.work(f"0 only 1 {command}")
                 is_done = command == "pictura"
                 self.assertEqual((status, "only has failed" in said), (0, False) if is_done else (1, True), said)
 
-    def test_what_the_time_ends_has_not_failed(self):
+    def test_work_out_of_time_is_not_a_failure(self):
         status, said, _ = self.work("0 long 1000 true", "1 training 1 pictura train late", "2 trained 1 pictura train done")
         self.assertEqual(status, 0, said)
         for what in ("GPU 0: no time for long", "GPU 1: training is not done: out of time", "GPU 2: trained is done"):
@@ -249,7 +249,7 @@ class Lanes(OnADevice):
         self.assertIn("slow is not done: out of time", said)
         self.assertFalse({name for name in self.packed() if name.endswith(".done")} - {"runs/lanes/trained.done"})
 
-    def test_training_ends_after_the_minutes_of_its_line(self):
+    def test_training_ends_after_its_configured_minutes(self):
         for arguments, is_done in (("", False), (" --minutes 1", True), (" --minutes 1000", False)):
             with self.subTest(arguments):
                 status, said, _ = self.work(f"0 run{len(arguments)} 1 pictura train late{arguments}")
@@ -267,7 +267,7 @@ class Lanes(OnADevice):
         self.assertEqual(result.returncode, 1)
         self.assertIn("runs/lost is not packed: it has no checkpoint", result.stdout)
 
-    def test_weights_that_cannot_be_exported_leave_the_others_packed(self):
+    def test_a_failed_export_does_not_affect_other_weights(self):
         for name in ("broken", "whole"):
             self.write(f"runs/{name}/checkpoint.ckpt", "")
         self.write("runs/whole/policy_average.safetensors", "")
@@ -300,7 +300,7 @@ class Check(OnADevice):
         self.assertEqual(self.check("squares"), (0, ""))
         self.assertEqual(self.measured("squares"), ["squares"])
 
-    def test_only_that_matches_nothing_is_an_error(self):
+    def test_only_without_a_match_is_an_error(self):
         error = "error: gpu_check: --only: expected an expression that matches one of 'draw', 'squares', got 'plains'\n"
         self.assertEqual(self.check("--only", "plains", "profile", "squares"), (1, error))
 
@@ -310,7 +310,7 @@ class Check(OnADevice):
             self.assertEqual(self.check("squares", "--only", *bad), (2, error))
             self.assertFalse((self.root / "out").exists())
 
-    def test_a_measurement_that_fails_sets_the_status(self):
+    def test_a_failing_measurement_sets_the_status(self):
         self.write_program("pictura", 'test "$1" = --version')
         self.assertEqual(self.check("squares"), (1, ""))
 
@@ -359,7 +359,7 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
         lines = (self.root / folder / f"table_{cycles}.md").read_text().splitlines()
         return facts, [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[2:]]
 
-    def test_policies_and_baselines_stand_beside_the_papers(self):
+    def test_policies_and_baselines_are_compared_with_the_papers(self):
         result = self.run_script("--density", "medium", "--scenarios", "2")
         self.assertEqual(result.returncode, 0, result.stderr)
         drivers = [("towns", "a"), ("towns", "lane keeper"), ("towns", "idle"),
@@ -382,7 +382,7 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
         procedural = "--map " + ",".join(f"procedural:{seed}" for seed in range(1, 7))
         self.assertEqual(sum(procedural in line for line in asked), 6)
 
-    def test_a_table_is_what_was_chosen_and_grows(self):
+    def test_a_table_holds_chosen_rows_and_can_be_extended(self):
         small = ["--light-cycles", "as_trained", "--worlds", "procedural", "--procedural", "procedural:1"]
         result = self.run_script(*small, "--density", "dense", "--actions", "argmax", "sampled", "--results", self.root / "results",
                                  "--scenarios", "9", "--baseline-scenarios", "2")  # fmt: skip
@@ -401,7 +401,7 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
         self.assertEqual([row[:3] for row in self.table("as_trained")[1] if row[1] == "procedural"],
                          [[density, "procedural", name] for density in ("light", "dense") for name in ("a", "lane keeper", "idle")])  # fmt: skip
 
-    def test_devices_evaluate_at_once_and_baselines_drive_on_the_host(self):
+    def test_devices_evaluate_concurrently_and_baselines_drive_on_the_host(self):
         policies = [self.root / f"{name}.safetensors" for name in "abcd"]
         for policy in policies:
             policy.write_text(policy.stem)
@@ -418,7 +418,7 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
         self.assertEqual(len(self.asked.read_text().splitlines()), 12)
         self.assertEqual(self.run_script("--devices", "cuda:0", "--device", "cuda").returncode, 1)
 
-    def test_an_evaluation_that_fails_is_named_and_what_was_done_is_kept(self):
+    def test_a_failed_evaluation_is_named_and_finished_ones_are_kept(self):
         (self.root / "broken").write_text("")
         result = self.run_script("--light-cycles", "phases", "--density", "medium,dense")
         self.assertEqual(result.returncode, 1)
@@ -427,7 +427,7 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
         self.assertFalse(facts["complete"])
         self.assertEqual({row["density"] for row in facts["rows"]}, {"medium"})
 
-    def test_arguments_that_the_script_has_names_of_its_own_for_are_refused(self):
+    def test_evaluate_options_with_script_equivalents_are_refused(self):
         for argument, instead in {"--map": "--towns or --procedural", "--sampled": "--actions sampled"}.items():
             result = self.run_script(argument)
             self.assertEqual((result.returncode, result.stderr), (1, f"error: reproduce_table: {argument}: expected {instead}\n"))
@@ -435,7 +435,7 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
         self.assertEqual(result.returncode, 2)
         self.assertIn("got 'thick'", result.stderr)
 
-    def test_the_program_itself_fills_a_small_table(self):
+    def test_the_real_program_fills_a_small_table(self):
         program = os.environ.get("PICTURA_PROGRAM_WITH_TORCH")
         if not program:
             self.skipTest("this build has no torch")
@@ -474,7 +474,7 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
             self.assertEqual((result.returncode, len(result.stderr.splitlines())), (1, 1), result.stderr)
             self.assertIn("trainings.toml: expected [[line]] with name", result.stderr)
 
-    def test_what_was_evaluated_is_not_evaluated_again_unless_it_is_asked_otherwise(self):
+    def test_finished_evaluations_are_reused_by_default(self):
         chosen = ["--density", "medium", "--light-cycles", "phases", "--worlds", "towns"]
         first = self.run_script(*chosen)
         self.assertEqual(self.run_script(*chosen).stdout, first.stdout)
@@ -485,7 +485,7 @@ print(json.dumps({{"rows": rows, "policy_hash": "abc", "device": "cpu", "precisi
         self.run_script(*chosen, "--steps", "600")
         self.assertEqual(len(self.asked.read_text().splitlines()), 7)
 
-    def test_a_policy_that_is_missing_is_named(self):
+    def test_errors_name_a_missing_policy(self):
         result = self.run_script("--policies", self.root / "none.safetensors")
         self.assertEqual(result.returncode, 1)
         self.assertIn("none.safetensors: no such file", result.stderr)
@@ -550,7 +550,7 @@ class Setup(unittest.TestCase):
 
 
 class InstallTorch(Scratch):
-    """Wheels of the right names that are no torch, in folders, and in an index that this process serves."""
+    """Wheels named like those of torch, without its contents, in folders, and in an index that this process serves."""
 
     COPIED = ("install_torch",)
 
@@ -574,7 +574,7 @@ class InstallTorch(Scratch):
         return subprocess.run([sys.executable, "-c", "import ensurepip, venv"], capture_output=True).returncode == 0
 
     def install(self, *options, index=None):
-        """What is installed, and what was said."""
+        """Returns the installed version of torch and the output."""
         default = {"PIP_NO_INDEX": "1"} if index is None or not index.startswith("http") else {"PIP_INDEX_URL": f"file://{self.root}/none"}
         result = self.run_script("install_torch", self.root / "venv/bin/python", *options, PIP_FIND_LINKS=str(self.root / "default"),
                                  PIP_CACHE_DIR=str(self.root / "cache"), PICTURA_TORCH_INDEX=index or "", **default)  # fmt: skip
@@ -592,7 +592,7 @@ class InstallTorch(Scratch):
             self.assertEqual(self.install("--cpu", index=f"http://127.0.0.1:{server.server_port}/")[0], "2.11.0+cpu")
             server.shutdown()
 
-    def test_the_default_build_comes_where_the_other_is_not_found_or_not_reached(self):
+    def test_the_default_build_is_the_fallback(self):
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             unreachable = f"http://127.0.0.1:{free.getsockname()[1]}/"
@@ -603,12 +603,12 @@ class InstallTorch(Scratch):
                 self.assertIn("instead the default build", said)
                 self.assertIn("PICTURA_TORCH_INDEX", said)
 
-    def test_with_a_gpu_the_default_build_is_chosen(self):
+    def test_a_gpu_selects_the_default_build(self):
         version, said = self.install("--gpu", index=str(self.root / "cpu/torch"))
         self.assertEqual(version, "2.11.0")
         self.assertNotIn("+cpu", said)
 
-    def test_a_compiler_of_cuda_code_chooses_it_too(self):
+    def test_a_cuda_compiler_selects_the_default_build(self):
         which = lambda *options: self.run_script("install_torch", "--which", *options).stdout.strip()  # noqa: E731
         has_gpu = list(pathlib.Path("/dev").glob("nvidia[0-9]*")) or os.access("/usr/local/cuda/bin/nvcc", os.X_OK) or shutil.which("nvcc")
         self.assertEqual(which(), "gpu" if has_gpu else "cpu")
@@ -644,7 +644,7 @@ class JoinWheels(Scratch):
         self.old = self.wheel("old", f"pictura/_driving.{self.SUFFIX}")
         self.torch = self.wheel("torch", f"pictura/_training_2_11.{self.SUFFIX}")
 
-    def test_each_build_has_its_place_and_the_record_is_of_all_files(self):
+    def test_builds_have_separate_folders_and_the_record_lists_all_files(self):
         result = self.join(self.v3, "--x86-64", self.old, "--torch", self.torch)
         self.assertEqual(result.returncode, 0, result.stderr)
         with zipfile.ZipFile(self.root / "out" / self.NAME) as archive:
@@ -667,7 +667,7 @@ class JoinWheels(Scratch):
             "pictura/x86_64/bin/pictura": "old", f"pictura/_training_2_11.{self.SUFFIX}": "torch", "pictura/bin/torch_2_11/pictura": "torch",
         })  # fmt: skip
 
-    def test_what_does_not_fit_together_is_refused(self):
+    def test_incompatible_wheels_are_refused(self):
         for arguments, message in (((self.torch,), "expected a build without torch"),
                                    ((self.v3, "--torch", self.torch, self.torch), "another wheel has it too"),
                                    ((self.v3, "--x86-64", self.root / "none.whl"), "expected a wheel named"),
@@ -713,10 +713,10 @@ class Runs(unittest.TestCase):
         self.assertEqual(result.returncode, 3, result.stderr)
         return (self.root / "asked").read_text().split()
 
-    def test_the_demo_begins_anew(self):
+    def test_the_demo_overwrites_an_earlier_run(self):
         self.assertIn("--overwrite", self.asked("demo"))
 
-    def test_the_demo_says_how_far_seeds_spread(self):
+    def test_the_demo_prints_the_spread_of_seeds(self):
         def demo(*arguments):
             environment = {**os.environ, "PICTURA_VENV": "venv", "PATH": f"{self.root}/venv/bin:/usr/bin:/bin"}
             return subprocess.run([self.root / "scripts/demo", *arguments], env=environment, capture_output=True, text=True,
@@ -740,7 +740,7 @@ class Runs(unittest.TestCase):
             result = demo("--seeds", bad)
             self.assertEqual((result.returncode, result.stderr), (2, f"error: demo: --seeds: expected 2 to 99, got '{bad}'\n"))
 
-    def test_training_goes_on_exactly_where_there_is_a_checkpoint(self):
+    def test_training_resumes_if_a_checkpoint_exists(self):
         train = ("gpu_train", "run", "--minutes", "8")
         self.assertEqual(self.asked(*train), ["train", "--out", "runs/run", "--minutes", "8", "--json"])
         self.assertNotIn("--resume", self.asked(*train))
@@ -774,7 +774,7 @@ class Profile(unittest.TestCase):
             self.assertEqual((result.returncode, result.stdout), (1, ""))
             self.assertIn("No kernels were profiled", result.stderr)
 
-    def test_a_command_or_a_table_is_expected(self):
+    def test_a_command_or_a_table_is_required(self):
         self.assertEqual(self.profile().returncode, 2)
 
 
@@ -809,13 +809,13 @@ class Record(unittest.TestCase):
         self.assertEqual((failed["measured"], failed["outcome"]), ({"faults": [3]}, "exit status 1"))
         self.assertEqual(failed["last_lines"], ["broken"])
 
-    def test_a_bench_without_a_json_object_has_failed(self):
+    def test_a_bench_without_a_json_object_fails(self):
         for script in ("echo '[1]'", "echo fast", "true", "exit 1"):
             with self.subTest(script):
                 status, content = self.bench(script)
                 self.assertEqual((status, "measured" in content["failed"][0]), (1, False))
 
-    def test_what_is_kept_is_of_the_same_sources(self):
+    def test_kept_results_have_the_same_sources(self):
         self.bench("echo '{}'")
         self.assertEqual(len(self.record("start", "--keep")[1]["bench"]), 1)
         self.assertFalse(self.record("start", "--keep")[1]["complete"])

@@ -1,4 +1,4 @@
-"""What tests read of replays and live pages."""
+"""Readers of replays and live pages for tests."""
 
 import http.client
 import json
