@@ -50,7 +50,7 @@ CornerState state(int scene, int ego, float distance_m, float speed_mps, int use
           .speed_mps = speed_mps};
 }
 
-TEST(CornerPairs, AreOfLikeDistancesAndSpeeds) {
+TEST(CornerPairs, HaveSimilarDistancesAndSpeeds) {
   const std::vector<CornerState> hidden{state(1, 0, 20, 5, 7)};
   EXPECT_TRUE(match_corners(hidden, {state(2, 0, 21.1f, 5), state(2, 1, 20, 5.6f)}, 9).empty());
   EXPECT_TRUE(match_corners(hidden, {state(1, 0, 20, 5)}, 9).empty()) << "the same ego";
@@ -59,7 +59,7 @@ TEST(CornerPairs, AreOfLikeDistancesAndSpeeds) {
   EXPECT_EQ(pairs[0].empty.scene, 3) << "the likest";
 }
 
-TEST(CornerPairs, TakeNoVehicleTwiceAndScenesInTurn) {
+TEST(CornerPairs, UseEachVehicleOnceAndCycleThroughScenes) {
   // Ego 0 has two states with the same user; the second empty ego waits for a user for which the first is not similar
   // enough.
   const std::vector<CornerState> hidden{state(1, 0, 20, 5, 7, 20), state(1, 0, 21, 5, 7, 10), state(1, 2, 20, 5, 7),
@@ -105,7 +105,7 @@ struct CornerKind {
 };
 using Corner = test::ProbeTest<CornerKind>;
 
-TEST_F(Corner, PairsAreFoundAndAllPoliciesStartAlike) {
+TEST_F(Corner, PairsAreFoundAndAllPoliciesStartInTheSameState) {
   const CornerResults& all = results();
   ASSERT_GE(all.pairs.size(), 8u) << "of " << all.hidden_found << " hidden and " << all.empty_found << " empty states";
   ASSERT_EQ(all.takeovers.size(), all.pairs.size() * 2 * kCornerCases * 3);
@@ -164,7 +164,7 @@ TEST_F(Corner, UnseenVehiclesChangeNothingForCamerasAndMuchForVectors) {
   EXPECT_GT(differ[kVectorized] + differ[kLikeForLike], 0u);
 }
 
-TEST_F(Corner, WithoutWallsItIsSeenFromTheStart) {
+TEST_F(Corner, WithoutWallsTheVehicleIsVisibleFromTheStart) {
   const CornerResults& all = results();
   size_t sooner = 0, later = 0;
   for (size_t pair = 0; pair < all.pairs.size(); ++pair) {
@@ -179,7 +179,7 @@ TEST_F(Corner, WithoutWallsItIsSeenFromTheStart) {
 
 // Vectors hold no walls: without walls these policies drive the same, among the same parked cars, up to where walls end
 // a run. Also at empty corners.
-TEST_F(Corner, WallsAloneAreGone) {
+TEST_F(Corner, TheOpenConditionRemovesOnlyWalls) {
   const CornerResults& all = results();
   size_t compared = 0;
   for (size_t pair = 0; pair < all.pairs.size(); ++pair) {
@@ -198,12 +198,12 @@ TEST_F(Corner, WallsAloneAreGone) {
   EXPECT_GT(compared, all.pairs.size());
 }
 
-TEST_F(Corner, BatchesDecideNothing) {
+TEST_F(Corner, BatchSizeDoesNotChangeResults) {
   ASSERT_GT(results().pairs.size(), static_cast<size_t>(takeover_pass({}))) << "else there is but one batch";
   expect_the_same_of_batches({1});
 }
 
-TEST_F(Corner, AnotherOneIsRemovedInstead) {
+TEST_F(Corner, ThePermutedControlRemovesAnotherVehicle) {
   const CornerResults permuted = controlled(CornerControl::permuted);
   const CornerResults& all = results();
   ASSERT_EQ(permuted.pairs.size(), all.pairs.size());
@@ -254,7 +254,7 @@ TEST_F(Corner, UntrainedPoliciesTakeOverInTheSameStates) {
   }
 }
 
-TEST_F(Corner, SeedsDecideWhatIsFound) {
+TEST_F(Corner, SeedsDetermineTheStates) {
   CornerOptions one = options(4);
   one.policies = {policies_[kAgent]};
   CornerOptions other = one;
@@ -268,7 +268,7 @@ TEST_F(Corner, SeedsDecideWhatIsFound) {
   EXPECT_NE(states_of(probe_corner(one)), states_of(probe_corner(other)));
 }
 
-TEST_F(Corner, RefusesWhatCannotBe) {
+TEST_F(Corner, RefusesInvalidOptions) {
   CornerOptions o = options(2);
   o.worlds.steps = 85;
   EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("more than 85 steps, of which a takeover takes 80, got 85"));
@@ -338,7 +338,7 @@ TEST(CornerResults, AreMeasuredAtTheReveal) {
   EXPECT_NEAR(empty->corner_m, 10.5, 1e-5);
 }
 
-TEST(CornerResults, DifferencesAreOfPairs) {
+TEST(CornerResults, DifferencesAreTakenWithinPairs) {
   const CornerResults all = made_up_corners();
   const std::vector<CornerRow> rows = summarize(all);
   ASSERT_EQ(rows.size(), 2u * (6 + 3 + 4));
@@ -366,7 +366,7 @@ TEST(CornerResults, DifferencesAreOfPairs) {
   EXPECT_NEAR(find(1, {}, CornerCase::removed).at_reveal.speed_mps.value, 2, 1e-5);
 }
 
-TEST(CornerResults, AreWrittenRunByRun) {
+TEST(CornerResults, AreWrittenPerRun) {
   const test::ScratchFolder folder;
   const CornerResults all = made_up_corners();
   write_corner_cases(folder / "cases.csv", all);

@@ -67,7 +67,7 @@ class SceneEvaluations : public ::testing::Test {
   std::string agents_;
 };
 
-TEST_F(SceneEvaluations, AreTheSameForAnyBatch) {
+TEST_F(SceneEvaluations, DoNotDependOnBatchSize) {
   for (int i = 1; i <= 5; ++i) write(i, {.num_vehicles = 4 + 2 * i});
   options_.scenes_at_once = 1;
   const std::string one_by_one = figures();
@@ -89,7 +89,7 @@ TEST_F(SceneEvaluations, AreTheSameForAnyBatch) {
 }
 
 /// Counts of a hand-driven simulator for the evaluation's scene.
-TEST_F(SceneEvaluations, EqualASimulatorThatIsDrivenByHand) {
+TEST_F(SceneEvaluations, EqualAManuallyDrivenSimulator) {
   write(1);
   for (const char* rules : {"", "after_infraction=drive_on", "after_infraction=leave", "overlapping=drive"}) {
     SCOPED_TRACE(rules);
@@ -157,7 +157,7 @@ TEST_F(SceneEvaluations, RecordedActionsArriveAndAreRemoved) {
   EXPECT_EQ(evaluate_scenes(options_).results.agent_steps(), 600);
 }
 
-TEST_F(SceneEvaluations, LeaveOutWhatCannotBeUsed) {
+TEST_F(SceneEvaluations, SkipUnusableScenes) {
   write(1);
   write(2, {.num_vehicles = 1, .num_pedestrians = 2, .num_cyclists = 0});
   // Scene of parked vehicles only.
@@ -194,7 +194,7 @@ TEST_F(SceneEvaluations, LeaveOutWhatCannotBeUsed) {
   EXPECT_THAT(test::message_of<UsageError>([&] { evaluate_scenes(options_); }), HasSubstr("in [0, 1), got 1"));
 }
 
-TEST_F(SceneEvaluations, TakeOverLaterAndLetTheRecordVanish) {
+TEST_F(SceneEvaluations, SupportLaterTakeoverAndVanishingTracks) {
   Scenario late = *test::crossing({.num_vehicles = 1, .num_pedestrians = 3, .num_cyclists = 0});
   int32_t mover = 0;
   while (!is_moving(late, mover)) ++mover;

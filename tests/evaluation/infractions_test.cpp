@@ -100,7 +100,7 @@ TEST(Infractions, CollisionsStateTheirPartnersAndKinds) {
   EXPECT_EQ(hit.partner_motion, PartnerMotion::moving);
 }
 
-TEST(Infractions, WrecksAndLaneChangesAreTold) {
+TEST(Infractions, WrecksAndLaneChangesAreDescribed) {
   // The second leaves the road at once and halts, across the lane of the first.
   const Infraction wreck =
       infraction_of_the_first({.x_m = 50, .speed_mps = 10}, {.x_m = 66, .y_m = -1, .heading_rad = -0.5f * kPi});
@@ -116,7 +116,7 @@ TEST(Infractions, WrecksAndLaneChangesAreTold) {
   EXPECT_TRUE(across.changed_lane);
 }
 
-TEST(Evaluation, CountsLivesOnRoadsThatEnd) {
+TEST(Evaluation, CountsLivesOnOpenRoads) {
   const test::ScratchFolder folder;
   const std::string street = folder / "street.xodr";
   write_file(street, test::open_street(120));
@@ -143,7 +143,7 @@ TEST(Evaluation, CountsLivesOnRoadsThatEnd) {
   EXPECT_EQ(rows_of(read_results(folder / "results.json")).at(0).left, row.left);
 }
 
-TEST(Infractions, OfAnEvaluationAreThoseThatItCounts) {
+TEST(Infractions, ObservedInfractionsEqualTheCountsOfTheEvaluation) {
   InfractionObserver observer;
   EvaluateOptions options;
   options.controller = "random";

@@ -84,7 +84,7 @@ TEST(MixedTraffic, IsReadFromTexts) {
   EXPECT_THAT(refused(std::vector<std::string>(9, "lane=0.1")), HasSubstr("expected at most 8, got 9"));
 }
 
-TEST(MixedTraffic, OfOneControllerCountsEachVehicleOnce) {
+TEST(MixedTraffic, CountsEachVehicleOnceForOneController) {
   const EvaluateReport alone = evaluate_controller("idm_lanes", {}),
                        mixed = evaluate_controller("idm_lanes", {"idm_lanes=0.3", "idm_lanes=0.4"});
   ASSERT_EQ(alone.rows.size(), 1u);
@@ -101,7 +101,7 @@ TEST(MixedTraffic, OfOneControllerCountsEachVehicleOnce) {
   EXPECT_EQ(mixed.rows[1].asked, mixed.rows[1].vehicle_episodes) << "pedestrians and cyclists are number 0's";
 }
 
-TEST(MixedTraffic, ShowsHowEachDrives) {
+TEST(MixedTraffic, HasOneRowPerDriver) {
   const EvaluateReport report = evaluate_controller("random", {"lane=0.5"});
   EXPECT_EQ(report.rows[1].off_road_rate.value, 0);
   EXPECT_GT(report.rows[1].km_per_vehicle.value, 0);
@@ -133,7 +133,7 @@ TEST(MixedTraffic, PartsMergeIntoTheWhole) {
               HasSubstr("others"));
 }
 
-TEST(MixedTraffic, CountsImpairedAgentsByThemselves) {
+TEST(MixedTraffic, CountsImpairedAgentsSeparately) {
   const EvaluateReport report = evaluate_controller("lane", {"phantom_braking=0.4", "idle=0.3"});
   ASSERT_EQ(report.rows.size(), 3u);
   EXPECT_EQ(report.rows[1].driver, "phantom_braking");
@@ -157,7 +157,7 @@ TEST(MixedTraffic, RefusesImpairmentsWithoutEffect) {
 
 class MixedPolicies : public test::ProbedPolicies {};
 
-TEST_F(MixedPolicies, OfAllKindsDriveTogether) {
+TEST_F(MixedPolicies, AllKindsDriveTogether) {
   const EvaluateReport report = evaluate_policy(
       policies_[test::kAgent], {policies_[test::kVectorized] + "=0.25", policies_[test::kLikeForLike] + "=0.25"});
   ASSERT_EQ(report.rows.size(), 3u);
@@ -176,7 +176,7 @@ TEST_F(MixedPolicies, DriveWhileImpaired) {
   }
 }
 
-TEST_F(MixedPolicies, WithoutAuxiliarySlotsReadZerosWhereTheWorldFillsThem) {
+TEST_F(MixedPolicies, PoliciesWithoutAuxiliarySlotsReadZeros) {
   // Share that selects no vehicle.
   const EvaluateReport alone = evaluate_policy(policies_[test::kLikeForLike], {}),
                        beside =

@@ -48,7 +48,7 @@ TEST(CrossingPaths, BeginBehindTheVehicle) {
   EXPECT_TRUE(paths_behind(car({0, 0}), {0, 0}).empty());
 }
 
-TEST(CrossingPaths, PedestriansStandInNoBoxAndNoWall) {
+TEST(CrossingPaths, PedestriansOverlapNoBoxAndNoWall) {
   const CrossingPath path{{0, 0}, {0, 1}, 0};
   AgentBox other = car({0, 10}), above = car({0, 20}), absent = car({0, 25});
   above.center_m.z = 6;
@@ -62,7 +62,7 @@ TEST(CrossingPaths, PedestriansStandInNoBoxAndNoWall) {
   }
 }
 
-TEST(CrossingPaths, AreHiddenThenSeenThenHiddenAgain) {
+TEST(CrossingPaths, AreHiddenThenVisibleThenHidden) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   // Hidden from 3 m before the origin to 1 m behind it, seen for 5 m, hidden for 12 m.
   std::vector<float> shares(kPathPoints, 0.5f);
@@ -165,7 +165,7 @@ TEST_F(Pedestrian, HiddenPedestriansChangeNothingForCamerasAndMuchForVectors) {
   EXPECT_GT(near_changes, near * 9 / 10);
 }
 
-TEST_F(Pedestrian, NoPedestrianChangesNothing) {
+TEST_F(Pedestrian, AnAbsentPedestrianChangesNothing) {
   const PedestrianResults control = controlled(PedestrianControl::nobody);
   ASSERT_EQ(control.points.size(), results().points.size());
   for (size_t i = 0; i < control.responses.size(); ++i) {
@@ -174,7 +174,7 @@ TEST_F(Pedestrian, NoPedestrianChangesNothing) {
   }
 }
 
-TEST_F(Pedestrian, UntrainedPoliciesAnswerOnTheSamePaths) {
+TEST_F(Pedestrian, UntrainedPoliciesAreEvaluatedOnTheSamePaths) {
   const PedestrianResults control = controlled(PedestrianControl::untrained);
   const PedestrianResults& all = results();
   ASSERT_EQ(control.points.size(), all.points.size());
@@ -193,11 +193,11 @@ TEST_F(Pedestrian, UntrainedPoliciesAnswerOnTheSamePaths) {
   EXPECT_GT(seen_changes, 10);
 }
 
-TEST_F(Pedestrian, BatchesDecideNothing) { expect_the_same_of_batches({1, 300}); }
+TEST_F(Pedestrian, BatchSizeDoesNotChangeResults) { expect_the_same_of_batches({1, 300}); }
 
-TEST_F(Pedestrian, SeedsDecideWhatIsFound) { EXPECT_EQ(expect_seeds_to_decide(2).paths.size(), 2u); }
+TEST_F(Pedestrian, SeedsDetermineThePaths) { EXPECT_EQ(expect_seeds_to_decide(2).paths.size(), 2u); }
 
-TEST_F(Pedestrian, RefusesWhatCannotBe) {
+TEST_F(Pedestrian, RefusesInvalidOptions) {
   PedestrianOptions o = options(2);
   o.worlds.scenarios = 4;
   EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("divisible among 3 policies, got 4"));
@@ -261,7 +261,7 @@ TEST(PedestrianResults, MeansAreAlignedAtFirstSight) {
   EXPECT_NEAR(first_sight.value_change.half_width_95, 0.98, 1e-9);
 }
 
-TEST(PedestrianResults, AreWrittenPlaceByPlace) {
+TEST(PedestrianResults, AreWrittenPerPlace) {
   const test::ScratchFolder folder;
   const PedestrianResults all = made_up_pedestrians();
   write_pedestrian_cases(folder / "cases.csv", all);

@@ -25,7 +25,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 constexpr double kHalfTurn = M_PI, kQuarterTurn = M_PI / 2;
 
-TEST(RealismBoxes, AreApartByTheirRoundedSidesAndCorners) {
+TEST(RealismBoxes, DistancesAreBetweenRoundedSidesAndCorners) {
   const RealismBox car{0, 0, 0, 4, 2};
   // Front to back.
   EXPECT_NEAR(rounded_box_distance_m(car, {10, 0, 0, 4, 2}), 6, 1e-12);
@@ -42,7 +42,7 @@ TEST(RealismBoxes, AreApartByTheirRoundedSidesAndCorners) {
   EXPECT_GT(rounded_box_distance_m(car, {3.9, 1.9, 0, 4, 2}), 0);
 }
 
-TEST(RealismTimes, AreTheGapOverTheClosingSpeedBehindWhatIsFollowed) {
+TEST(RealismTimes, TimeToCollisionIsGapOverClosingSpeed) {
   const RealismBox car{0, 0, 0, 4, 2};
   double gap_m = 0;
   EXPECT_NEAR(time_to_collision_s(car, 10, {14, 0, 0, 4, 2}, 5, &gap_m), 2, 1e-12);
@@ -68,7 +68,7 @@ TEST(RealismTimes, AreTheGapOverTheClosingSpeedBehindWhatIsFollowed) {
   EXPECT_TRUE(follows({14, 1.7, 11 * kDegree, 4, 2}));
 }
 
-TEST(RealismMotion, IsOfCentralDifferences) {
+TEST(RealismMotion, UsesCentralDifferences) {
   const std::vector<double> squares{0, 1, 4, 9, 16};
   const std::vector<double> rates = central_differences(squares, 0.5);
   EXPECT_THAT(std::vector<double>(rates.begin() + 1, rates.end() - 1), ::testing::ElementsAre(4, 8, 12));
@@ -79,7 +79,7 @@ TEST(RealismMotion, IsOfCentralDifferences) {
 
 TEST(RealismLikelihoods, AreSharesOfSmoothedBins) {
   const RealismTerm term{1, 0, 10, 5, 0.1};
-  // Bins of 2: counts 3, 0, 1, 0, 1 of five; what is beyond counts in the last one, NaN nowhere.
+  // Bins of 2: counts 3, 0, 1, 0, 1 of five; values above the range count in the last bin, NaN in no bin.
   const std::vector<double> simulated{0, 1, 1.9, 4, 99, NAN}, recorded{-1, 3, 10, NAN};
   const std::vector<double> logs = log_likelihoods(term, recorded, simulated);
   EXPECT_NEAR(std::exp(logs[0]), 3.1 / 5.5, 1e-12);
@@ -93,7 +93,7 @@ TEST(RealismLikelihoods, AreSharesOfSmoothedBins) {
   EXPECT_NEAR(std::exp(event_log_likelihood(event, true, 8, 32)), 8.001 / 32.002, 1e-12);
 }
 
-TEST(RealismVersions, WeighOneInAll) {
+TEST(RealismVersions, WeightsSumToOne) {
   EXPECT_THAT(realism_version_names(), ::testing::ElementsAre("2024", "2025"));
   for (const RealismVersion& version : realism_versions()) {
     double sum = 0;
@@ -160,7 +160,7 @@ double feature(const RealismFeatures& features, RealismFeature which, size_t ste
   return features.of(0, which)[step];
 }
 
-TEST(RealismScenes, HaveFeaturesThatCanBeWorkedOut) {
+TEST(RealismScenes, HaveHandComputedFeatures) {
   const RealismScene scene(std::make_shared<const Scenario>(straight_road()));
   EXPECT_THAT(scene.track_ids(), ::testing::ElementsAre(7, 9));
   EXPECT_THAT(scene.scored_ids(), ::testing::ElementsAre(7));
@@ -202,7 +202,7 @@ TEST(RealismScenes, HaveFeaturesThatCanBeWorkedOut) {
   EXPECT_EQ(feature(drifts, RealismFeature::collision, 9), 0);
 }
 
-TEST(RealismScenes, ScoreWhatTheRecordingIsUnderRollouts) {
+TEST(RealismScenes, ScoreTheRecordingUnderRollouts) {
   const RealismScene scene(std::make_shared<const Scenario>(straight_road()));
   const RealismVersion& version = realism_version("2025");
   const auto at = [](RealismFeature feature) { return static_cast<size_t>(feature); };
@@ -244,7 +244,7 @@ TEST(RealismScenes, ScoreWhatTheRecordingIsUnderRollouts) {
   EXPECT_GT(in_2024.score, scene.score(rollout_at(1.5, 0, 4), version).score);
 }
 
-TEST(RealismScenes, RefuseWhatTheyCannotScore) {
+TEST(RealismScenes, RefuseInvalidRollouts) {
   Scenario scenario = straight_road();
   scenario.dt_s = 0.2f;
   EXPECT_THAT(message_of<Error>([&] { RealismScene(std::make_shared<const Scenario>(scenario)); }),
@@ -270,13 +270,13 @@ class RealismFiles : public ::testing::Test {
   test::ScratchFolder folder_;
 };
 
-TEST_F(RealismFiles, AreReadAsTheyWereWritten) {
+TEST_F(RealismFiles, ReadBackEqual) {
   SceneRollouts scene = rollout_at(8, 0, 2);
   scene.rollouts[1][3].heading_rad = 1.5f;
   RolloutsFile file(folder_ / "a.binproto");
   file.write(scene);
   file.commit();
-  // What another program writes besides is passed over.
+  // Unknown fields of other programs are skipped.
   std::string bytes = read_file(folder_ / "a.binproto");
   append_bytes(3, "somebody", &bytes);
   const RolloutsReader reader(write("b.binproto", bytes));
@@ -294,7 +294,7 @@ TEST_F(RealismFiles, AreReadAsTheyWereWritten) {
   EXPECT_EQ(encoded(RolloutsReader(write("c.binproto", both)).read("straight")), encoded(rollout_at(8, 0, 2)));
 }
 
-TEST_F(RealismFiles, AreRefusedByFileScenarioAndField) {
+TEST_F(RealismFiles, ErrorsNameFileScenarioAndField) {
   EXPECT_THAT(
       message_of<Error>([&] { RolloutsReader(write("twice", bytes_of({rollout_at(8, 0), rollout_at(8, 0)}))); }),
       AllOf(HasSubstr("twice: scenario_rollouts[1]"), HasSubstr("'straight' is there twice")));
@@ -330,7 +330,7 @@ TEST_F(RealismFiles, AreRefusedByFileScenarioAndField) {
   }
 }
 
-TEST_F(RealismFiles, AreScoredByTheirScenes) {
+TEST_F(RealismFiles, MatchTheirScenes) {
   std::vector<SceneRollouts> scenes;
   for (const std::string id : {"a", "b", "c"}) {
     Scenario scenario = straight_road();

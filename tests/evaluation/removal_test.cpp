@@ -90,7 +90,7 @@ TEST_F(Removal, UnseenAgentsChangeNothingForCamerasAndMuchForVectors) {
   RecordProperty("outside", outside);
 }
 
-TEST_F(Removal, VectorPoliciesMissThePartnersThatTheyRead) {
+TEST_F(Removal, HidingObservedPartnersChangesVectorPolicies) {
   const RemovalResults& all = results();
   int near = 0;
   std::array<int, 3> changed{};
@@ -133,7 +133,7 @@ TEST_F(Removal, HidingAnotherUserGivesOtherNumbers) {
   EXPECT_GT(differ, others * 9 / 10);
 }
 
-TEST_F(Removal, UntrainedPoliciesAnswerInTheSameStates) {
+TEST_F(Removal, UntrainedPoliciesAreEvaluatedInTheSameStates) {
   const RemovalResults control = controlled(RemovalControl::untrained);
   const RemovalResults& all = results();
   ASSERT_EQ(control.cases.size(), all.cases.size());
@@ -169,7 +169,7 @@ TEST_F(Removal, UntrainedPoliciesAnswerInTheSameStates) {
   EXPECT_EQ(json.at("policy")[0].at("untrained_hash"), control.policies[kAgent].untrained_hash);
 }
 
-TEST_F(Removal, WeightsOfUntrainedPoliciesAreOfTheSeed) {
+TEST_F(Removal, SeedsDetermineWeightsOfUntrainedPolicies) {
   const PolicySession trained(policies_[kAgent], {.num_threads = 1, .device = "cpu"});
   const auto hash_of = [&](uint64_t seed) { return trained.make_untrained(seed)->policy_hash(); };
   EXPECT_EQ(hash_of(1), hash_of(1));
@@ -177,9 +177,9 @@ TEST_F(Removal, WeightsOfUntrainedPoliciesAreOfTheSeed) {
   EXPECT_EQ(trained.make_untrained(1)->training_world().walls, trained.training_world().walls);
 }
 
-TEST_F(Removal, BatchesDecideNothing) { expect_the_same_of_batches({1, 300}); }
+TEST_F(Removal, BatchSizeDoesNotChangeResults) { expect_the_same_of_batches({1, 300}); }
 
-TEST_F(Removal, SeedsDecideWhatIsDrawn) { EXPECT_EQ(expect_seeds_to_decide(30).cases.size(), 30u); }
+TEST_F(Removal, SeedsDetermineTheCases) { EXPECT_EQ(expect_seeds_to_decide(30).cases.size(), 30u); }
 
 TEST_F(Removal, PoliciesOfVectorsNeedNoImages) {
   RemovalOptions o = options(60);
@@ -196,7 +196,7 @@ TEST_F(Removal, PoliciesOfVectorsNeedNoImages) {
   EXPECT_TRUE(std::any_of(one.cases.begin(), one.cases.end(), [](const RemovalCase& c) { return c.is_in_frame(); }));
 }
 
-TEST_F(Removal, RefusesWhatCannotBe) {
+TEST_F(Removal, RefusesInvalidOptions) {
   RemovalOptions o = options(10);
   o.worlds.scenarios = 4;
   EXPECT_THAT(message_of([&] { probe(o); }), HasSubstr("divisible among 3 policies, got 4"));
@@ -263,7 +263,7 @@ TEST(RemovalResults, MeansAreOverScenes) {
   EXPECT_TRUE(std::isinf(row_of(rows, 0, 5).abs_value_change.value));
 }
 
-TEST(RemovalResults, AreWrittenCaseByCase) {
+TEST(RemovalResults, AreWrittenPerCase) {
   const test::ScratchFolder folder;
   const RemovalResults all = made_up_removals();
   write_removal_cases(folder / "cases.csv", all);

@@ -108,7 +108,7 @@ TEST(Results, StandingIsOverTimeWaitsAndVehicles) {
   EXPECT_DOUBLE_EQ(row.stuck_at_end_share.value, 0.1);
 }
 
-TEST(Results, FilesOfFormat1LackWhatTheyDidNotCount) {
+TEST(Results, FilesOfFormat1LackLaterCounts) {
   test::ScratchFolder folder;
   const std::string old_path = folder / "old.json", next_path = folder / "next.json", again = folder / "again.json";
   write_file(old_path, file_of_format_1(0, 2));
@@ -134,7 +134,7 @@ TEST(Results, FilesOfFormat1LackWhatTheyDidNotCount) {
   EXPECT_TRUE(rows_of(part(0, {counts(4, 1, 1000)}))[0].km_per_infraction.value == 1);
 }
 
-TEST(Results, WhatCannotBeKnownIsInfinite) {
+TEST(Results, UndefinedIntervalsAndDistancesAreInfinite) {
   const EvaluateRow one = row_of(part(0, {counts(4, 1, 1000)}).densities[0], 100);
   EXPECT_DOUBLE_EQ(one.at_fault_collision_rate.value, 0.25);
   EXPECT_TRUE(std::isinf(one.at_fault_collision_rate.half_width_95));
@@ -142,7 +142,7 @@ TEST(Results, WhatCannotBeKnownIsInfinite) {
   EXPECT_TRUE(std::isinf(clean.km_per_infraction.value));
 }
 
-TEST(Results, PartsInAnyOrderMakeTheWhole) {
+TEST(Results, PartsMergeInAnyOrder) {
   const EvaluationResults whole = part(3, {counts(4, 1, 10.25), counts(5, 2, 0.1), counts(6, 0, 1e9 / 3)});
   const EvaluationResults first = part(3, {whole.densities[0].scenarios[0]});
   const EvaluationResults rest = part(4, {whole.densities[0].scenarios[1], whole.densities[0].scenarios[2]});
@@ -156,7 +156,7 @@ TEST(Results, PartsInAnyOrderMakeTheWhole) {
   EXPECT_EQ(read_file(merged_path), read_file(whole_path));
 }
 
-TEST(Results, PartsThatDoNotFitAreRefusedByName) {
+TEST(Results, ErrorsNameTheDifferenceOfIncompatibleParts) {
   const EvaluationResults first = part(0, {counts(4, 1, 10), counts(4, 1, 10)});
   EXPECT_THAT(merged_message(first, part(1, {counts(4, 1, 10)})),
               AllOf(HasSubstr("b.json: light: begins with scenario 1: expected 2"), HasSubstr("a.json")));
@@ -187,7 +187,7 @@ TEST(Results, PartsThatDoNotFitAreRefusedByName) {
   EXPECT_THAT(message_of([] { merge({}, {}); }), HasSubstr("one part or more"));
 }
 
-TEST(Results, FilesSayTheLightCyclesAndThoseOfBeforeHavePhases) {
+TEST(Results, FilesHoldLightCyclesAndOldFilesHavePhases) {
   test::ScratchFolder folder;
   const std::string path = folder / "x.json";
   EvaluationResults results = part(0, {counts(4, 1, 10)});
@@ -205,7 +205,7 @@ TEST(Results, FilesSayTheLightCyclesAndThoseOfBeforeHavePhases) {
               AllOf(HasSubstr("x.json"), HasSubstr("expected phases, independent, got 'alone'")));
 }
 
-TEST(Results, FilesBeforeLightHeadsCouldMoveAreRead) {
+TEST(Results, FilesWithoutLightHeadPlacementAreRead) {
   test::ScratchFolder folder;
   const std::string path = folder / "x.json";
   EvaluationResults moved = part(0, {counts(4, 1, 10)});
@@ -218,7 +218,7 @@ TEST(Results, FilesBeforeLightHeadsCouldMoveAreRead) {
   EXPECT_EQ(read_results(path).setting.light_heads, "as_mapped");
 }
 
-TEST(Results, OtherFilesAreRefusedByName) {
+TEST(Results, ErrorsNameForeignFiles) {
   test::ScratchFolder folder;
   const std::string path = folder / "x.json";
   for (const char* text :

@@ -41,7 +41,7 @@ TEST(RobustProtocol, FirstConditionIsPlainAndNamesAreUnique) {
   EXPECT_EQ(names.size(), conditions.size());
 }
 
-TEST(RobustProtocol, DrivesAControllerWhereConditionsApply) {
+TEST(RobustProtocol, DrivesAControllerUnderApplicableConditions) {
   RobustOptions of_lane_keeper = lane_keeper();
   std::vector<double> fractions;
   of_lane_keeper.on_progress = [&fractions](double done, double) { fractions.push_back(done); };
@@ -87,7 +87,7 @@ TEST(RobustProtocol, DrivesAControllerWhereConditionsApply) {
   EXPECT_EQ(report.setting.steps, kRobustSteps);
 }
 
-TEST(RobustProtocol, RefusesWhatItFixes) {
+TEST(RobustProtocol, RefusesOptionsThatItFixes) {
   RobustOptions options = lane_keeper();
   options.seed = 2;
   EXPECT_THAT(test::message_of<UsageError>([&options] { evaluate_robust(options); }), HasSubstr("seed: has no effect"));

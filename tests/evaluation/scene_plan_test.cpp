@@ -38,7 +38,7 @@ std::vector<AgentBox> boxes_at(const Scenario& scene, int32_t step) {
   return boxes;
 }
 
-TEST(SceneProtocols, AreDataAndTheirRulesCanBeChosenOtherwise) {
+TEST(SceneProtocols, RulesCanBeChosenIndividually) {
   EXPECT_THAT(scene_protocol_names(),
               ::testing::ElementsAre("womd", "gpudrive", "pufferdrive2", "pufferdrive3", "waymax", "simagents"));
   EXPECT_EQ(scene_protocol("womd").steps, 600);
@@ -88,7 +88,7 @@ TEST(SceneProtocols, ThinTheSameRoadUsersForASeed) {
   }
 }
 
-TEST(SceneProtocols, ReplaceFirstHeadingsThatNoMotionExplains) {
+TEST(SceneProtocols, ReplaceImplausibleFirstHeadings) {
   const auto scene = crossing();
   const auto first_heading_deg = [&](const char* protocol_name, float max_deg, float turn_deg) {
     SceneProtocol protocol = scene_protocol(protocol_name);
