@@ -100,7 +100,7 @@ TEST(BlindApproaches, AreFoundWithTheLanesOfHiddenTraffic) {
   EXPECT_EQ(one[0].approach, kEastwards);
 }
 
-TEST(BlindApproaches, LanesThatBeginTooCloseAreSkipped) {
+TEST(BlindApproaches, LanesThatBeginNearbyAreSkipped) {
   const RoadMap map = Crossing().map;
   expect_count(count_blind_approaches(map, corner(6), 40), 2, 2, 2, 2);
   expect_count(count_blind_approaches(map, corner(6), 41), 0, 0, 0, 0);

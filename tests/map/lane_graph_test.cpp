@@ -69,7 +69,7 @@ TEST(LaneGraph, RoutesAlongOneLaneAndAroundALoop) {
   EXPECT_EQ(behind.cost_m, behind.length_m);
 }
 
-TEST(LaneGraph, ChangesLanesAtEqualFractions) {
+TEST(LaneGraph, LaneChangesKeepTheFractionOfTheLane) {
   const RoadMap map = ring();
   const LaneGraph graph(map, 10);
   const LaneRoute exit = graph.route({0, 40}, {4, 5}).value();

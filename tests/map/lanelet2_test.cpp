@@ -132,7 +132,7 @@ TEST(Lanelet2, AOneWayStreetHasItsLengthWidthHeightsAndOpenEnds) {
   EXPECT_EQ(map.road_names, std::vector<std::string>{"20"});
 }
 
-TEST(Lanelet2, BordersAreAlignedWhicheverWayTheyRun) {
+TEST(Lanelet2, BordersOfAnyDirectionAreAligned) {
   const RoadMap expected = sound(street());
   for (const auto& [left, right] : {std::pair{"2,1", "3,4"}, {"1,2", "4,3"}, {"2,1", "4,3"}}) {
     OsmText text;
@@ -143,7 +143,7 @@ TEST(Lanelet2, BordersAreAlignedWhicheverWayTheyRun) {
   }
 }
 
-TEST(Lanelet2, BordersOfUnlikePointsGiveTheMiddleOfTheSurface) {
+TEST(Lanelet2, BordersWithDifferentPointsGiveTheMiddleOfTheSurface) {
   // A quarter circle about (0, 0) between radii of 8 and 12 m, the outer border with more points.
   OsmText text;
   std::vector<int> inner, outer;
@@ -165,7 +165,7 @@ TEST(Lanelet2, BordersOfUnlikePointsGiveTheMiddleOfTheSurface) {
   }
 }
 
-TEST(Lanelet2, AStatedCenterLineIsTheLanes) {
+TEST(Lanelet2, AStatedCenterLineIsUsed) {
   OsmText text;
   text.node(1, 0, 4).node(2, 100, 4).node(3, 0, 0).node(4, 100, 0).node(5, 100, 1).node(6, 0, 1);
   text.way(11, {1, 2}).way(12, {3, 4}).way(13, {5, 6});
@@ -187,7 +187,7 @@ OsmText three_lanes(const TagList& left_line, const TagList& right_line) {
   return text.lanelet(20, 1, 2).lanelet(21, 2, 3).lanelet(22, 3, 4);
 }
 
-TEST(Lanelet2, LinesSayWhereLanesChange) {
+TEST(Lanelet2, LineTypesDetermineLaneChanges) {
   const TagList dashed{{"type", "line_thin"}, {"subtype", "dashed"}},
       solid{{"type", "line_thin"}, {"subtype", "solid"}};
   const RoadMap map = sound(three_lanes(dashed, solid));
@@ -210,7 +210,7 @@ TEST(Lanelet2, LinesSayWhereLanesChange) {
   EXPECT_FALSE(changes({{"type", "line_thin"}, {"lane_change:left", "no"}, {"lane_change:right", "no"}}));
 }
 
-TEST(Lanelet2, LanesFollowWhereBordersShareTheirPoints) {
+TEST(Lanelet2, LanesWithSharedBorderPointsAreLinked) {
   OsmText text;
   text.node(1, 0, 3).node(2, 50, 3).node(3, 100, 3).node(4, 0, 0).node(5, 50, 0).node(6, 100, 0);
   text.node(7, 90, 20).node(8, 93, 18);
@@ -224,7 +224,7 @@ TEST(Lanelet2, LanesFollowWhereBordersShareTheirPoints) {
   EXPECT_EQ(map.facts.junctions, 0);
 }
 
-TEST(Lanelet2, LanesThatMeetWithoutSharedPointsAreToldOf) {
+TEST(Lanelet2, LanesThatMeetWithoutSharedPointsAreReported) {
   OsmText text;
   text.node(1, 0, 3).node(2, 50, 3).node(4, 0, 0).node(5, 50, 0);
   text.node(102, 50, 3).node(3, 100, 3).node(105, 50, 0).node(6, 100, 0);
@@ -234,7 +234,7 @@ TEST(Lanelet2, LanesThatMeetWithoutSharedPointsAreToldOf) {
   EXPECT_EQ(map.mends[0].line, 15);
 }
 
-TEST(Lanelet2, TwoWayLaneletsAreALaneEachWay) {
+TEST(Lanelet2, TwoWayLaneletsBecomeOneLanePerDirection) {
   OsmText text;
   text.node(1, 0, 5).node(2, 50, 5).node(3, 100, 5).node(4, 0, 0).node(5, 50, 0).node(6, 100, 0);
   text.way(11, {1, 2}).way(12, {4, 5}).way(13, {2, 3}).way(14, {5, 6});
@@ -340,7 +340,7 @@ TEST(Lanelet2, LinesArePainted) {
   }
 }
 
-TEST(Lanelet2, DashesBeginAndEndAtThePointsThatSaySo) {
+TEST(Lanelet2, DashesBeginAndEndAtTheirTaggedPoints) {
   OsmText text = street();
   text.node(30, 0, 1).node(31, 10, 1, 0, "begin").node(32, 14, 1, 0, "end").node(33, 20, 1, 0, "start");
   text.node(34, 25, 1, 0, "end").node(35, 90, 1);
@@ -497,7 +497,7 @@ TEST(Lanelet2, LightsWithoutStopLinesHoldTrafficAtTheEndOfTheirLanes) {
   EXPECT_NEAR(in_file(map, map.lights[0].stop_b_m).y, -2, 1e-4);
 }
 
-TEST(Lanelet2, LightsOfOneStopLineAreOne) {
+TEST(Lanelet2, LightsOfOneStopLineAreMerged) {
   // Autoware's maps have an element for each way on.
   OsmText text = crossing(true);
   text.relation(800, {{"way", "refers", 621}, {"way", "ref_line", 520}},
@@ -519,7 +519,7 @@ TEST(Lanelet2, HeadsOnTheGroundAreRaised) {
   EXPECT_EQ(map.lights[0].junction, -1);
 }
 
-TEST(Lanelet2, LightsForThoseWhoWalkAreNoFault) {
+TEST(Lanelet2, PedestrianLightsAreIgnored) {
   OsmText text = street();
   text.node(30, 40, 3.5).node(31, 40, 0).node(32, 44, 3.5).node(33, 44, 0).way(51, {30, 31}).way(52, {32, 33});
   text.relation(50, {{"way", "refers", 51}}, {{"subtype", "traffic_light"}});
@@ -646,7 +646,7 @@ TEST(Lanelet2, MgrsCodesGiveTheReferenceOrThePlace) {
   EXPECT_EQ(map.origin_m, (std::array<double, 3>{410050, 3920002, 0}));
 }
 
-TEST(Lanelet2, FilesAreLoadedCachedAndCopiedByName) {
+TEST(Lanelet2, MapNamesLoadCachedFilesAndCopies) {
   const ScratchFolder folder;
   const EnvironmentVariable cache("XDG_CACHE_HOME", folder / "cache"), on("PICTURA_CACHE", std::nullopt);
   const std::string path = folder / "street.osm";
@@ -724,7 +724,7 @@ TEST(Lanelet2, FaultsWithOneMeaningAreRepaired) {
   repaired(with([](OsmText* text) { text->relation(30, {}, {{"subtype", "traffic_light"}}); }), RepairKind::empty_rule);
 }
 
-TEST(Lanelet2, DeletedElementsAreNotThere) {
+TEST(Lanelet2, DeletedElementsAreIgnored) {
   OsmText text = street();
   text.line(R"(<node id="1" action="delete" lat="0" lon="0"/>)");
   text.line(R"(<relation id="20" action="delete"/>)");
@@ -810,7 +810,7 @@ TEST(Lanelet2, HostileFilesGiveAMapOrAnError) {
   EXPECT_EQ(try_import(shared.text()), 0);
 }
 
-TEST(Lanelet2, EveryKindOfFaultStandsInTheTable) {
+TEST(Lanelet2, TheTableListsEveryKindOfFault) {
   const std::string docs = read_file(PICTURA_LANELET2_DOCS);
   for (const RepairKind kind : repair_kinds()) {
     if (kind < kFirstLanelet2Repair) continue;

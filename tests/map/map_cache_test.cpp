@@ -236,7 +236,7 @@ TEST_F(MapCacheFolder, TheSecondLoadComesFromTheCache) {
   EXPECT_TRUE(fs::exists(cache_file()));
 }
 
-TEST_F(MapCacheFolder, AMapIsNamedByTheLinkThatItIsLoadedBy) {
+TEST_F(MapCacheFolder, AMapIsNamedAfterItsLink) {
   write_source(small_file());
   const std::string file = source_;
   source_ = folder_ / "alias.xodr";
@@ -273,7 +273,7 @@ TEST_F(MapCacheFolder, OtherOptionsHaveTheirOwnFile) {
   EXPECT_EQ(outcome(), "cached");
 }
 
-TEST_F(MapCacheFolder, AnotherImporterImportsAgain) {
+TEST_F(MapCacheFolder, AChangedImporterImportsAgain) {
   write_source(small_file());
   outcome();
   MapCacheKey key = map_cache_key(read_file(source_), {});

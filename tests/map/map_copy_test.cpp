@@ -162,7 +162,7 @@ TEST_P(Copies, KeepConnectionsWidthsHeightsAndLimits) {
   }
 }
 
-TEST_P(Copies, StretchStraightLanesAsThePlanDoes) {
+TEST_P(Copies, StretchStraightLanesByThePlan) {
   for (int number = 1; number <= kCopies; ++number) {
     const auto map = copy(number);
     const PlanMap plan = draw_map_copy(original_->name, number);
@@ -184,7 +184,7 @@ TEST_P(Copies, StretchStraightLanesAsThePlanDoes) {
 }
 
 /// Where the tightest turns of a town have shrunk, the straight sides of a car on them may touch an edge.
-TEST_P(Copies, CanBeDrivenNearlyWithoutTouchingRoadEdges) {
+TEST_P(Copies, SeldomHaveRoadEdgesWithinCarWidth) {
   for (int number = 1; number <= kCopies; ++number) {
     const test::DrivenLanes driven = test::drive_lanes(*copy(number));
     EXPECT_GT(driven.poses, 5000);
@@ -204,7 +204,7 @@ double distance_to(const RoadMap& map, const Lane& lane, Vec2 p) {
   return nearest;
 }
 
-TEST_P(Copies, ARotationAloneRotatesTheMap) {
+TEST_P(Copies, APureRotationRotatesTheMap) {
   const auto map = load_map(GetParam(), {.plan = {0, -1, 1, 0}});
   const auto rotated = [&](Vec3 p) {  // from the original's coordinates to the copy's
     const double x = p.x + original_->origin_m[0], y = p.y + original_->origin_m[1];
@@ -242,7 +242,7 @@ TEST_P(Copies, ARotationAloneRotatesTheMap) {
   EXPECT_NEAR(map->facts.driving_lane_km, original_->facts.driving_lane_km, 1e-6);
 }
 
-TEST(MapCopy, FilesAndTheirCopiesAreCachedApart) {
+TEST(MapCopy, FilesAndTheirCopiesAreCachedSeparately) {
   const test::ScratchFolder folder;
   const test::EnvironmentVariable cache("XDG_CACHE_HOME", folder.path()), on("PICTURA_CACHE", std::nullopt);
   const std::string file = folder.path() + "/a.xodr";
@@ -257,7 +257,7 @@ TEST(MapCopy, FilesAndTheirCopiesAreCachedApart) {
   EXPECT_EQ(first_difference(*load_map(file), *original), "");
 }
 
-TEST(MapCopy, WhatCannotBeACopyIsRefused) {
+TEST(MapCopy, InvalidCopiesAreRefused) {
   EXPECT_THAT(message_of<UsageError>([] { map_text("procedural:3#1"); }), HasSubstr("got a copy"));
   EXPECT_THAT(message_of<UsageError>([] { load_map("Nowhere#1"); }), HasSubstr("map 'Nowhere'"));
   for (const PlanMap plan :

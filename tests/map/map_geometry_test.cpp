@@ -85,7 +85,7 @@ TEST(MapGeometry, MarksHaveTheColourOfTheFile) {
   EXPECT_FLOAT_EQ(reds[7], 0);
 }
 
-TEST(MapGeometry, PaintedStopLinesAreDrawnWhereNoLightDrawsItsOwn) {
+TEST(MapGeometry, PaintedStopLinesAreDrawnUnlessALightDrawsOne) {
   const std::string line =
       R"(<objects><object id="1" type="stopLine" s="{}" t="-3" length="0.5" width="6"/></objects>)";
   const std::string light = R"(<signals><signal id="50" type="1000001" s="1" t="-7"/></signals>)";

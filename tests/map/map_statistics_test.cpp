@@ -23,7 +23,7 @@ Lane& add_lane(RoadMap* map, float length_m, float width_m, float turn_rad, floa
   return lane;
 }
 
-TEST(MapStatistics, OfAnEmptyMapAreZero) {
+TEST(MapStatistics, AnEmptyMapHasZeros) {
   const MapStatistics statistics = map_statistics({});
   EXPECT_THAT(statistics.lane_width_m, Each(0));
   EXPECT_THAT(statistics.radius_shares, Each(0));
@@ -50,7 +50,7 @@ TEST(MapStatistics, WeighLanesByLength) {
   EXPECT_NEAR(statistics.parking_share, 0.25, 1e-6);
 }
 
-TEST(MapStatistics, CountTheRoadsThatMeetAndMeasureHeadsFromTheirLines) {
+TEST(MapStatistics, CountRoadsAtJunctionsAndMeasureHeadDistances) {
   RoadMap map;
   map.junctions.resize(1);
   for (int i = 0; i < 5; ++i) {

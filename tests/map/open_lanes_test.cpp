@@ -38,7 +38,7 @@ void expect_no_edges_across(const RoadMap& map, const OpenLanes& open) {
     EXPECT_EQ(edges_across(map, opening), 0) << "entry of lane " << opening.lane;
 }
 
-TEST(OpenLanes, AStreetIsAnExitAndAnEntryAtEitherEnd) {
+TEST(OpenLanes, AStreetHasAnExitAndAnEntryAtEachEnd) {
   const RoadMap map = map_of(test::open_street());
   EXPECT_FALSE(has_endless_roads(map));
   const OpenLanes open = find_open_lanes(map);
@@ -76,7 +76,7 @@ TEST(OpenLanes, NoEdgeCrossesTheEndsOfLanesThatGetWider) {
   }
 }
 
-TEST(OpenLanes, ACrossingHasOneExitAndOneEntryAnArm) {
+TEST(OpenLanes, ACrossingHasOneExitAndOneEntryPerArm) {
   const RoadMap map = map_of(test::open_crossing());
   const OpenLanes open = find_open_lanes(map);
   EXPECT_EQ(open.exits.size(), 4u);
@@ -91,7 +91,7 @@ TEST(OpenLanes, ACrossingHasOneExitAndOneEntryAnArm) {
   }
 }
 
-TEST(OpenLanes, ALaneThatEndsBesideAnotherIsNoExit) {
+TEST(OpenLanes, AMergingLaneIsNotAnExit) {
   const RoadMap map = map_of(test::open_ramp());
   const OpenLanes open = find_open_lanes(map);
   EXPECT_EQ(open.exits.size(), 2u);
@@ -101,14 +101,14 @@ TEST(OpenLanes, ALaneThatEndsBesideAnotherIsNoExit) {
   for (const size_t lane : {0u, 1u, 2u}) EXPECT_NEAR(open.way_after_m[lane], 150, 0.01);
 }
 
-TEST(OpenLanes, WhatIsTooShortIsNotOpen) {
+TEST(OpenLanes, ShortLanesAreNotOpen) {
   const RoadMap map = map_of(test::open_street(19));
   const OpenLanes open = find_open_lanes(map);
   EXPECT_TRUE(open.entries.empty());
   EXPECT_EQ(count_lane_use(map).unreachable, 2);
 }
 
-TEST(OpenLanes, MissingLinksAreNoExitsAndAreCounted) {
+TEST(OpenLanes, MissingLinksAreNotExitsAndAreCounted) {
   const RoadMap map = map_of(test::unlinked_roads());
   const OpenLanes open = find_open_lanes(map);
   ASSERT_EQ(open.exits.size(), 1u);

@@ -38,7 +38,7 @@ const std::vector<MapCase> kCases{
     {"utm_loop", "coordinates of a UTM zone, 5,800 km from its origin"},
 };
 
-TEST(OpenDriveCases, ThePageSaysWhatIsMadeOfEachFile) {
+TEST(OpenDriveCases, ThePageListsTheResultOfEachFile) {
   std::string table = "| file | what it has | lanes | endless, open | what is done |\n|---|---|---|---|---|\n";
   for (const MapCase& its : kCases) {
     const std::string file = its.name + ".xodr";

@@ -166,7 +166,7 @@ std::string made_of(const std::string& text) {
   }
 }
 
-TEST(OpenDriveConformance, TheTableSaysWhatIsMadeOfFilesThatBreakARule) {
+TEST(OpenDriveConformance, TheTableListsTheHandlingOfEachRuleViolation) {
   std::string table = "| rule | file | what is done |\n|---|---|---|\n";
   for (const BrokenRule& rule : broken_rules()) {
     table += fmt::format("| {} | {} | {} |\n", rule.id, rule.file, made_of(rule.text));

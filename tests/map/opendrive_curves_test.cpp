@@ -80,7 +80,7 @@ TEST(OpenDriveCurves, ACurveOfAnotherLengthThanItsGeometryKeepsItsShape) {
   EXPECT_NEAR(map.facts.driving_lane_km, 1e-3 * parabola_length(60), 1e-4);
 }
 
-TEST(OpenDriveCurves, TheParameterRangeThatFitsCounts) {
+TEST(OpenDriveCurves, TheConsistentParameterRangeIsUsed) {
   const char* const curve = R"(<paramPoly3 pRange="{}" aU="0" bU="60" cU="0" dU="0" aV="0" bV="0" cV="36" dV="0"/>)";
   RoadMap map = parse(parabola(fmt::format(fmt::runtime(curve), "arcLength")).text());
   ASSERT_EQ(map.mends.size(), 1u);
@@ -92,7 +92,7 @@ TEST(OpenDriveCurves, TheParameterRangeThatFitsCounts) {
   EXPECT_EQ(first_difference(map, same), "");
 }
 
-TEST(OpenDriveCurves, ACurveWithoutAMeaningIsRejected) {
+TEST(OpenDriveCurves, AnUndefinedCurveIsRejected) {
   EXPECT_THROW(parse(parabola("<paramPoly3 pRange=\"normalized\"/>").text()), Error);
   EXPECT_THROW(
       parse(parabola(R"(<paramPoly3 pRange="metres" aU="0" bU="60" cU="0" dU="0" aV="0" bV="0" cV="36" dV="0"/>)")

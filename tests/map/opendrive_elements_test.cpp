@@ -275,7 +275,7 @@ std::string done_with(const Element& element) {
   return is_missed || contents_of(*with) != contents_of(*without) ? "read" : "ignored";
 }
 
-TEST(OpenDriveElements, TheTableSaysWhatIsDoneWithEachElement) {
+TEST(OpenDriveElements, TheTableListsTheHandlingOfEachElement) {
   std::string table = "| element | versions | what is done |\n|---|---|---|\n";
   for (const Element& element : elements()) {
     table += fmt::format("| {} | {} | {} |\n", element.path, element.versions, done_with(element));

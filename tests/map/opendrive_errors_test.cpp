@@ -177,7 +177,7 @@ TEST(OpenDriveErrors, SectionsAreInOrder) {
   EXPECT_THAT(message_of(file_of(road.text())), HasSubstr("<laneSection>: attribute s: expected a number in [0, 100]"));
 }
 
-TEST(OpenDriveErrors, UnsupportedFeaturesAreRejectedByName) {
+TEST(OpenDriveErrors, ErrorsNameUnsupportedFeatures) {
   RoadText road;
   road.right = lane_of(-1, "driving", 3);
   for (const char* type : {"virtual", "crossing"}) {
@@ -236,7 +236,7 @@ TEST(OpenDriveErrors, ObjectsAndSignalsAreNearTheirRoad) {
 }
 
 // Files of a few kilobytes that once took minutes or gigabytes.
-TEST(OpenDriveErrors, WhatSmallFilesRepeatIsBounded) {
+TEST(OpenDriveErrors, RepetitionsInSmallFilesAreBounded) {
   RoadText road;
   road.length = 1e5;
   const auto mark = [](const std::string& offset, double length, double space) {

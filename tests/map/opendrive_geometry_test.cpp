@@ -45,7 +45,7 @@ std::string turnaround(double radius, double straight) {
          R"(<laneLink from="-1" to="-1"/></connection></junction>)";
 }
 
-TEST(OpenDriveGeometry, WhereALaneFoldsOverItselfThereIsNoRoadEdge) {
+TEST(OpenDriveGeometry, ASelfOverlappingLaneHasNoRoadEdgeInside) {
   for (const double radius : {1.0, 2.0, 3.0, 3.9}) {
     for (const double straight : {1.0, 6.0}) {
       const RoadMap map = parse(turnaround(radius, straight));
@@ -254,7 +254,7 @@ TEST(OpenDriveLanes, SpeedUnits) {
   }
 }
 
-TEST(OpenDriveLanes, ARingIsEndlessAndADeadEndIsNotUnlessOneCanChangeLanes) {
+TEST(OpenDriveLanes, LanesWithAccessToARingAreEndlessAndDeadEndsAreNot) {
   // A circular road of radius 20, linked to itself; only the outer of its two lanes is linked.
   RoadText ring;
   ring.length = 40 * M_PI;

@@ -83,7 +83,7 @@ TEST(OpenDrivePaint, MarksHaveTheirPatternsColoursAndWidths) {
   }
 }
 
-TEST(OpenDrivePaint, CrosswalksAndParkingSpacesAreWhereTheyShouldBe) {
+TEST(OpenDrivePaint, CrosswalksAndParkingSpacesAreAtTheirPlaces) {
   RoadText road;
   road.geometry = line_at(0, 0, 0, M_PI / 2, 100);
   road.right = lane_of(-1, "driving", 3);

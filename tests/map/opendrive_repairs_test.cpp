@@ -272,7 +272,7 @@ TEST(OpenDriveRepairs, ProfilesOfRoadsOfNoLengthAreConstant) {
   EXPECT_EQ(map.facts.z_min_m, 0);
 }
 
-TEST(OpenDriveRepairs, RoadsWithoutADrawnLengthHaveNone) {
+TEST(OpenDriveRepairs, RoadsWithZeroLengthGeometryHaveNoLength) {
   const RoadMap map = repaired(ring_with(between_the_halves(0.1, 0).text()), RepairKind::short_road);
   EXPECT_EQ(num_endless(map), 3);
   EXPECT_NEAR(map.facts.driving_lane_km, 0.251, 1e-3);
@@ -333,7 +333,7 @@ TEST(OpenDriveRepairs, GeometriesOfNoLengthAreLeftOut) {
   EXPECT_FLOAT_EQ(map.lanes[0].length_m, 100);
 }
 
-TEST(OpenDriveRepairs, TheRoadIsWhatItsGeometrySays) {
+TEST(OpenDriveRepairs, TheGeometryDeterminesTheRoadLength) {
   for (const double length : {99.55, 100.45, 98.0, 101.1, 50.0, 500.0}) {
     RoadText road = straight();
     road.geometry = line_at(0, 0, 0, 0, length);
@@ -438,7 +438,7 @@ TEST(OpenDriveRepairs, JumpsOfTheElevationAreSpreadOverTheRoad) {
 }
 
 /// Some writers begin a road with a geometry of no length with another heading.
-TEST(OpenDriveRepairs, GeometriesOfNextToNoLengthTurnNothing) {
+TEST(OpenDriveRepairs, VeryShortGeometriesDoNotTurnTheRoad) {
   constexpr double kNorth = 1.5707963267948966;
   for (const std::string& geometry : {line_at(0, 0, 0, 0, 1e-9) + line_at(1e-9, 1e-9, 0, kNorth, 100),
                                       line_at(0, 0, 0, kNorth, 100) + line_at(100, 0, 100, 0, 1e-9)}) {
@@ -488,7 +488,7 @@ TEST(OpenDriveRepairs, GeometriesFollowEachOther) {
 
 // Names of elements.
 
-TEST(OpenDriveRepairs, LanesWithoutATypeHaveOne) {
+TEST(OpenDriveRepairs, LanesWithoutATypeGetADefault) {
   const RoadMap center = repaired(ring_with("",
                                             [](RoadText* road) {
                                               road->sections =
@@ -516,7 +516,7 @@ TEST(OpenDriveRepairs, AttributesWithoutAValueAreMissing) {
   EXPECT_EQ(difference(map, sound(straight().text())), "");
 }
 
-TEST(OpenDriveRepairs, UnknownNamesHaveAMeaning) {
+TEST(OpenDriveRepairs, UnknownNamesGetADefault) {
   const RoadMap lanes =
       repaired(straight(lane_of(-1, "driving", 3) + lane_of(-2, "canal", 2)).text(), RepairKind::unknown_lane_type);
   EXPECT_EQ(lane_named(lanes, "1", 0, -2).type, LaneType::other);
@@ -605,7 +605,7 @@ std::string with_rest(const std::string& rest) {
   return road.text();
 }
 
-TEST(OpenDriveRepairs, ObjectsThatCannotStandAreLeftOut) {
+TEST(OpenDriveRepairs, InvalidObjectsAreLeftOut) {
   for (const auto& [kind, object] : std::vector<std::pair<RepairKind, std::string>>{
            {RepairKind::misplaced_item, R"(<object id="1" type="crosswalk" s="500" t="0" length="2" width="2"/>)"},
            {RepairKind::misplaced_item,
@@ -624,7 +624,7 @@ TEST(OpenDriveRepairs, ObjectsThatCannotStandAreLeftOut) {
             0u);
 }
 
-TEST(OpenDriveRepairs, RepeatsThatCannotBeDrawnStandOnce) {
+TEST(OpenDriveRepairs, InvalidRepeatsAreDrawnOnce) {
   const auto parking = [](const std::string& contents) {
     return with_rest(R"(<objects><object id="1" type="parking" s="5" t="-5" length="5" width="2">)" + contents +
                      "</object></objects>");
@@ -639,7 +639,7 @@ TEST(OpenDriveRepairs, RepeatsThatCannotBeDrawnStandOnce) {
       1u);
 }
 
-TEST(OpenDriveRepairs, SignalsOfOneIdAllStand) {
+TEST(OpenDriveRepairs, SignalsWithARepeatedIdAreKept) {
   const RoadMap map = repaired(
       with_rest(
           R"(<signals><signal id="5" s="10" t="-4" orientation="+"/><signal id="5" s="20" t="-4" orientation="+"/>)"
@@ -653,7 +653,7 @@ TEST(OpenDriveRepairs, SignalsOfOneIdAllStand) {
             1u);
 }
 
-TEST(OpenDriveRepairs, ReferencesToWhatIsAbsentAreLeftOut) {
+TEST(OpenDriveRepairs, ReferencesToAbsentElementsAreLeftOut) {
   const std::string road = straight().text();
   const std::string control = R"(<controller id="4"><control signalId="6"/></controller>)";
   EXPECT_EQ(
@@ -689,7 +689,7 @@ std::string two_roads(const std::string& link_1, const std::string& link_2, cons
 
 int num_links(const RoadMap& map) { return static_cast<int>(map.lane_links.size()) / 2; }
 
-TEST(OpenDriveRepairs, LinksToWhatIsAbsentAreLeftOut) {
+TEST(OpenDriveRepairs, LinksToAbsentElementsAreLeftOut) {
   const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
   EXPECT_EQ(num_links(sound(two_roads(to_2, to_1))), 1);
   EXPECT_THAT(said(repaired(two_roads(link_to("successor", "9", "start"), ""), RepairKind::missing_road)),
@@ -736,7 +736,7 @@ TEST(OpenDriveRepairs, OneSidedLinksBecomeMutual) {
   EXPECT_EQ(difference(map, sound(two_roads(to_2, link_to("predecessor", "1", "end")))), "");
 }
 
-TEST(OpenDriveRepairs, GeometryShowsTheEndOfALink) {
+TEST(OpenDriveRepairs, GeometryDeterminesTheEndOfALink) {
   const std::string to_2 = link_to("successor", "2", "start"), to_1 = link_to("predecessor", "1", "end");
   const RoadMap map = repaired(two_roads(link_to("successor", "2", "end"), to_1), RepairKind::wrong_end);
   EXPECT_THAT(said(map),
@@ -749,7 +749,7 @@ TEST(OpenDriveRepairs, GeometryShowsTheEndOfALink) {
   EXPECT_EQ(num_links(repaired(two_roads(link_to("successor", "2", "middle"), to_1), RepairKind::missing_contact)), 1);
 }
 
-TEST(OpenDriveRepairs, LinksThatAreReturnedElsewhereAreKeptWhereTheEndsTouch) {
+TEST(OpenDriveRepairs, InconsistentLinksAreKeptWhereTheEndsTouch) {
   RoadText third = straight();
   third.id = "3";
   third.geometry = line_at(0, 0, 50, 0, 100);
@@ -847,7 +847,7 @@ TEST(OpenDriveRepairs, TooManyFaultsAreRefused) {
               HasSubstr("after 1000000 other faults"));
 }
 
-TEST(OpenDriveRepairs, FaultsWithoutAMeaningAreRefused) {
+TEST(OpenDriveRepairs, AmbiguousFaultsAreRefused) {
   EXPECT_THROW(parse_opendrive("", "bad.xodr"), Error);
   EXPECT_THROW(parse_opendrive("<OpenDRIVE/>", "bad.xodr"), Error);
   for (const auto& [from, to] :
@@ -895,7 +895,7 @@ TEST(OpenDriveRepairs, DamagedFilesGiveAValidMapOrAnError) {
   EXPECT_GT(repaired_maps, 60);
 }
 
-TEST(OpenDriveRepairs, EveryKindStandsInTheTable) {
+TEST(OpenDriveRepairs, TheTableListsEveryKind) {
   const std::string docs = read_file(PICTURA_OPENDRIVE_DOCS);
   for (const RepairKind kind : repair_kinds()) {
     if (kind >= kFirstLanelet2Repair) continue;

@@ -104,7 +104,7 @@ std::string light(const std::string& id, double s, double t, const std::string& 
                      s, t, orientation);
 }
 
-TEST(OpenDriveLights, OneOnARoadStandsAloneAtItsStation) {
+TEST(OpenDriveLights, ALightOnARoadIsIndependent) {
   const auto ring_of = [](const std::string& lights) {
     return parse(test::ring_with("", [&](RoadText* road) { road->rest = "<signals>" + lights + "</signals>"; }));
   };
@@ -134,7 +134,7 @@ TEST(OpenDriveLights, OneOnARoadStandsAloneAtItsStation) {
   EXPECT_EQ(kinds_of(nothing), std::vector<RepairKind>{RepairKind::laneless_light});
 }
 
-TEST(OpenDriveLights, OneForBothDirectionsHasALineForEach) {
+TEST(OpenDriveLights, ALightForBothDirectionsHasTwoStopLines) {
   RoadText road;
   road.left = lane_of(1, "driving", 3);
   road.right = lane_of(-1, "driving", 3);
@@ -147,7 +147,7 @@ TEST(OpenDriveLights, OneForBothDirectionsHasALineForEach) {
   expect_at(map, map.lights[1].stop_b_m, 50, -3);
 }
 
-TEST(OpenDriveLights, OneOfLanesWithoutWidthDoesNotStand) {
+TEST(OpenDriveLights, ALightOfLanesWithoutWidthIsLeftOut) {
   RoadText road;
   road.right = R"(<lane id="-1" type="driving"><width sOffset="0" a="3" b="-0.06" c="0" d="0"/></lane>)";
   road.rest = "<signals>" + light("7", 50, -5) + "</signals>";
@@ -186,7 +186,7 @@ std::string crossing(const std::string& more_on_w, const std::string& junction_m
   return roads + "<junction id=\"7\">" + connections + junction_more + "</junction>";
 }
 
-TEST(OpenDriveLights, WithoutControllersThoseOfAJunctionCycleByHeading) {
+TEST(OpenDriveLights, WithoutControllersLightsOfAJunctionCycleByHeading) {
   const RoadMap map = parse(crossing(light("second head", 99, 3)));
   EXPECT_EQ(kinds_of(map), std::vector<RepairKind>(4, RepairKind::uncontrolled_light));
   ASSERT_EQ(map.lights.size(), 3u);
@@ -199,7 +199,7 @@ TEST(OpenDriveLights, WithoutControllersThoseOfAJunctionCycleByHeading) {
   expect_at(map, map.lights[0].stop_a_m, -10, 0);
 }
 
-TEST(OpenDriveLights, ThoseThatTheControllersOfAJunctionLeaveOutDoNotStand) {
+TEST(OpenDriveLights, LightsMissingFromJunctionControllersAreLeftOut) {
   const RoadMap map =
       parse(crossing("", R"(<controller id="90"/>)") + R"(<controller id="90"><control signalId="w"/></controller>)");
   ASSERT_EQ(map.lights.size(), 1u);
@@ -207,7 +207,7 @@ TEST(OpenDriveLights, ThoseThatTheControllersOfAJunctionLeaveOutDoNotStand) {
   EXPECT_EQ(kinds_of(map), std::vector<RepairKind>(2, RepairKind::unlisted_light));
 }
 
-TEST(OpenDriveSigns, ApplyToTheLanesThatTheyNameAndFaceTheirTraffic) {
+TEST(OpenDriveSigns, ApplyToTheirLanesAndFaceTheirTraffic) {
   RoadText road;
   road.left = lane_of(1, "driving", 3);
   road.right = lane_of(-1, "driving", 3) + lane_of(-2, "sidewalk", 2);

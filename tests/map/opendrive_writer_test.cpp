@@ -154,13 +154,13 @@ INSTANTIATE_TEST_SUITE_P(Towns, CarlaExport,
                          testing::Values("Town01", "Town02", "Town03", "Town04", "Town05", "Town06", "Town07",
                                          "Town10HD"));
 
-TEST_P(CarlaExport, KeepsTheMapAndThenEveryByte) {
+TEST_P(CarlaExport, KeepsTheMapAndReexportsEqualBytes) {
   const std::string path = map_folder() + "/carla/" + GetParam() + ".xodr";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there";
   check_round_trip(read_file(path), path);
 }
 
-TEST(OpenDriveExport, OfProceduralTownsKeepsEveryByte) {
+TEST(OpenDriveExport, KeepsEveryByteOfProceduralTowns) {
   for (uint64_t seed = 0; seed < 20; ++seed) {
     for (const TownFamily& family : town_families()) {
       TownOptions options = family.defaults;

@@ -224,7 +224,7 @@ TEST(GpuDrive, LightsAreReadFromObjectsAndLists) {
   }
 }
 
-TEST(GpuDrive, AnObjectSaysThatItIsTheSelfDrivingCar) {
+TEST(GpuDrive, AnObjectFlagSelectsTheSelfDrivingCar) {
   const OldScene old{.more = R"("metadata":{"sdc_track_index":0},)"};
   EXPECT_EQ(read_json(old.text()).sdc_track, 0);
   EXPECT_EQ(read_json(old.text(R"(,"is_sdc":false)")).sdc_track, 0);
@@ -234,7 +234,7 @@ TEST(GpuDrive, AnObjectSaysThatItIsTheSelfDrivingCar) {
             "scene.json: objects[1].is_sdc: expected true or false, got string");
 }
 
-TEST(GpuDrive, IndicesOfTracksThatWereDroppedAreLeftOut) {
+TEST(GpuDrive, IndicesOfDroppedTracksAreLeftOut) {
   LoggedScene scene = test::make_fixture({.num_steps = 3});
   scene.sdc_track = 80;
   scene.predictions[1].first = 90;
@@ -297,7 +297,7 @@ TEST(PufferDrive, BytesBeyondTheEndAndMissingOnesAreRefused) {
               HasSubstr("as v1: n_objects: expected 4 bytes, got the remaining 0"));
 }
 
-TEST(SceneFiles, TypesOfFilesAreToldByName) {
+TEST(SceneFiles, FileNamesDetermineFormats) {
   EXPECT_THAT(
       message_of([] { parse_scenario_file("", "scene.txt"); }),
       HasSubstr(

@@ -144,7 +144,7 @@ TEST(LaneRules, NeighborsAreMutualAndTheLongest) {
   EXPECT_EQ((scenario.map.lanes[0].left_neighbor >= 0) + (scenario.map.lanes[1].left_neighbor >= 0), 1);
 }
 
-TEST(LaneRules, LanesThatCrossAreAJunction) {
+TEST(LaneRules, CrossingLanesFormAJunction) {
   LoggedScene scene = small_scene();
   LoggedLane across{.id = 2, .type = LoggedLaneType::surface};
   for (int i = -20; i <= 20; ++i) across.points.emplace_back(10, 0.5 * i, 0);
@@ -209,7 +209,7 @@ TEST(PaintRules, StripesAndDashes) {
   EXPECT_NEAR(at(2).x - at(0).x, 12, 1e-4);
 }
 
-TEST(LightRules, LanesOfOneStopPointThatShowTheSameAreOneLight) {
+TEST(LightRules, LanesOfOneStopPointWithEqualStatesAreOneLight) {
   const LoggedScene fixture = test::make_fixture();
   const Scenario scenario = make_scenario(fixture);
   // Arm 0's right turn has its own arrow; arm 2's two lanes always have the same state.
@@ -235,7 +235,7 @@ TEST(TrackRules, SizesAreThoseOfTheLastValidState) {
   EXPECT_NEAR(scenario.states[1].heading_rad, 4 - 2 * kPi, 1e-6);
 }
 
-TEST(TrackRules, TracksThatAreNeverValidAreLeftOut) {
+TEST(TrackRules, TracksWithoutValidStatesAreLeftOut) {
   LoggedScene scene = small_scene();
   scene.tracks.insert(scene.tracks.begin(), scene.tracks[0]);
   for (LoggedState& state : scene.tracks[0].states) state.valid = false;
@@ -318,7 +318,7 @@ TEST(SceneCache, EveryFieldIsRestored) {
   EXPECT_EQ(first_difference(decode_scenario(bytes, kKey, "cache"), scenario), "");
 }
 
-TEST(SceneCache, OtherFilesAreRejectedWithTheirReason) {
+TEST(SceneCache, ErrorsGiveTheReasonForForeignFiles) {
   const Scenario scenario = make_scenario(small_scene());
   const std::string bytes = encode_scenario(scenario, kKey);
   const auto reason = [](const std::string& text, const SceneCacheKey& key = kKey) {
@@ -360,7 +360,7 @@ TEST(SceneCache, ScenesAndIndicesAreKeptUntilTheirFileChanges) {
   EXPECT_EQ(load_scenario(shard + "#2").id, "fixture00000004");
 }
 
-TEST(SceneCache, OtherBytesOfTheSameSizeAndTimeAreAnotherScene) {
+TEST(SceneCache, ChangedBytesOfEqualSizeAndTimeAreDetected) {
   const test::ScratchFolder folder, cache;
   const test::EnvironmentVariable on("PICTURA_CACHE", std::nullopt), home("XDG_CACHE_HOME", cache.path());
   const std::string shard = folder / "some.tfrecord";
@@ -385,7 +385,7 @@ Scenario stated_again(const Scenario& scenario) {
   return again;
 }
 
-TEST(StatedScenes, WhatAProgramStatesIsTakenAsItIs) {
+TEST(AuthoredScenes, AuthoredValuesAreNotRepaired) {
   LoggedScene scene = small_scene();
   scene.is_authored = true;
   scene.tolerance_m = 0.01;
@@ -412,7 +412,7 @@ TEST(StatedScenes, WhatAProgramStatesIsTakenAsItIs) {
   EXPECT_EQ(count_of(make_scenario(scene), "though the road is stated to be on their left"), 1);
 }
 
-TEST(StatedScenes, ComeBackToTheBit) {
+TEST(AuthoredScenes, ReadBackBitwiseIdentical) {
   LoggedScene scene = test::make_fixture();
   scene.is_authored = true;
   scene.tolerance_m = 0.01;
@@ -425,7 +425,7 @@ TEST(StatedScenes, ComeBackToTheBit) {
 }
 
 // Pieces, dashes and duplicates are near their limits everywhere on a winding map far from its origin.
-TEST(StatedScenes, ComeBackToTheBitFromAnyPlace) {
+TEST(AuthoredScenes, ReadBackBitwiseIdenticalFarFromTheOrigin) {
   for (const double away_m : {0.0, 3000.0, 9000.0}) {
     LoggedScene scene = small_scene();
     scene.is_authored = true;
@@ -456,7 +456,7 @@ TEST(StatedScenes, ComeBackToTheBitFromAnyPlace) {
   }
 }
 
-TEST(StatedScenes, RecordingsComeBackWithTheirTracksLinksAndLights) {
+TEST(AuthoredScenes, RecordingsKeepTheirTracksLinksAndLights) {
   Scenario recorded = make_scenario(test::make_fixture());
   Scenario stated = stated_again(recorded);
   EXPECT_EQ(first_difference(stated_again(stated), stated), "");

@@ -76,7 +76,7 @@ TEST(Womd, EveryFieldIsReadInAnyOrderAndPacking) {
   }
 }
 
-TEST(Womd, SceneHasWhatTheFixtureSays) {
+TEST(Womd, SceneMatchesTheFixture) {
   const Scenario scenario = read_womd(test::write_womd(test::make_fixture()));
   EXPECT_EQ(scenario.id, "fixture00000001");
   EXPECT_EQ(scenario.num_steps, 91);

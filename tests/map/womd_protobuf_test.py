@@ -1,8 +1,8 @@
-"""WOMD fixtures through an independent protobuf: our writer and our reader cannot err alike.
+"""WOMD fixtures encoded and parsed by an independent protobuf library, to find errors that writer and reader share.
 
 Usage: womd_protobuf_test.py SCENE_FIXTURE. The fixture's fields, by name, are encoded by Google's protobuf with the
-dataset's own schema (which the package py123d ships), and the record is read by our reader: it must be the scene that
-our own record is. Our record, in turn, must parse to the same message without unknown fields.
+dataset's own schema (which the package py123d ships), and the record is read by the project's reader: it must give
+the scene of the project's own record. The project's record, in turn, must parse to the same message without unknown fields.
 
 Runs with the Python that $PICTURA_PY123D names, or this one; exits with 77 where that lacks py123d or protobuf:
   python3 -m venv py123d && py123d/bin/pip install --no-deps py123d==0.7.0 && py123d/bin/pip install protobuf numpy
