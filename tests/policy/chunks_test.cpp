@@ -5,7 +5,7 @@
 namespace pictura {
 namespace {
 
-TEST(Chunks, AreOfOneSizeThatIsAllowed) {
+TEST(Chunks, HaveOneAllowedSize) {
   EXPECT_EQ(chunk_size(1000, {2048}, /*on_device=*/false), 1000);
   EXPECT_EQ(chunk_size(1000, {600}, false), 500);
   EXPECT_EQ(chunk_size(1001, {250}, false), 201);
@@ -22,7 +22,7 @@ TEST(Chunks, AreMultiplesOfAGranuleOnADevice) {
   EXPECT_EQ(chunk_size(64, {64}, true), 64);
 }
 
-TEST(Chunks, AreAllOfTheLargestSizeWhereTheyAreToBeFull) {
+TEST(Chunks, FullChunksHaveTheLargestSize) {
   for (const bool on_device : {false, true}) {
     for (const int64_t count : {1, 599, 600, 601, 5000}) EXPECT_EQ(chunk_size(count, {600, true}, on_device), 600);
   }
@@ -52,7 +52,7 @@ TEST(Chunks, HoldEachRowOnceAndFillTheLastUpWithTheFirst) {
   }
 }
 
-TEST(Chunks, OfAnEmptyBatchAreNone) {
+TEST(Chunks, AnEmptyBatchHasNone) {
   for_each_chunk(at::empty({0}, at::kLong), {6}, [](const Chunk&) { ADD_FAILURE(); });
 }
 

@@ -126,7 +126,7 @@ TEST_P(ReleasedPolicy, GivesTheLogitsAndActionsOfTorchWithoutIt) {
   EXPECT_LE(different, kSteps * static_cast<int>(slots) / 500);
 }
 
-TEST_P(ReleasedPolicy, SeesWhatIsDrawnAndShownAlone) {
+TEST_P(ReleasedPolicy, MatchesTorchWithHiddenAndUndrawnInputs) {
   PolicyInput asked = input();
   asked.hides_auxiliary = true;
   expect_equal_outputs(asked);
@@ -136,7 +136,7 @@ TEST_P(ReleasedPolicy, SeesWhatIsDrawnAndShownAlone) {
   expect_equal_outputs(asked);
 }
 
-TEST_P(ReleasedPolicy, HoldsActionsAsTorchsDoes) {
+TEST_P(ReleasedPolicy, HoldsActionsAsTorchDoes) {
   const SessionOptions options{.num_threads = 1, .device = "cpu", .decision_steps = 3};
   PolicySession torch(open_torch_session(path_, options)), host(open_host_session(path_, options));
   const auto by_torch = torch.make_controller(renderer_.get(), /*argmax=*/true, 5),
@@ -250,7 +250,7 @@ TEST(HostNetwork, ComputesEveryArchitecture) {
   }
 }
 
-TEST(HostNetwork, RefusesWhatItCannotCompute) {
+TEST(HostNetwork, RefusesUnsupportedPolicies) {
   Config config;
   config.policy = test::tiny_section(Modality::vector);
   const PolicyNetwork network(config.policy, 3, 1);

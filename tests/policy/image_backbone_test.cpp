@@ -38,7 +38,7 @@ class Programs : public ::testing::Test {
   test::ScratchFolder folder_;
 };
 
-TEST_F(Programs, GetColorsFromZeroToOneByCameraFilledUpWithBlack) {
+TEST_F(Programs, GetColorsFromZeroToOnePerCameraPaddedWithBlack) {
   const ImageBackbone means(write(description(2, 3, "null")), at::TensorOptions(at::kFloat), /*frozen=*/true);
   EXPECT_EQ(means.channels(), 3);
   EXPECT_TRUE(means.parameters().empty());
@@ -77,7 +77,7 @@ TEST_F(Programs, GetGradientsWhereTheyAreTrained) {
   EXPECT_TRUE(means.forward(images_).detach().allclose(2 * before));
 }
 
-TEST_F(Programs, OfAnotherKindAreRefusedByName) {
+TEST_F(Programs, ErrorsNameInvalidPrograms) {
   const at::TensorOptions options(at::kFloat);
   const auto message = [&](const std::string& path) { return message_of([&] { ImageBackbone(path, options, true); }); };
   EXPECT_THAT(message(write("")), AllOf(HasSubstr("means.pt"), HasSubstr("scripts/export_backbone")));

@@ -229,7 +229,7 @@ TEST_P(DeviceLayers, LargestEmbedding) {
   }
 }
 
-TEST_P(DeviceLayers, LargestEmbeddingGivesWayToNoNumberThatIsNone) {
+TEST_P(DeviceLayers, LargestEmbeddingPropagatesNanOfMembers) {
   if (GetParam() != Precision::bf16) GTEST_SKIP() << "one pass in bf16 alone";
   const LayerPrecision precision(Precision::bf16, at::kCUDA);
   const auto options = at::TensorOptions(at::kCUDA).dtype(at::kFloat);
@@ -276,7 +276,7 @@ TEST_P(DeviceLayers, RowFeatures) {
   }
 }
 
-TEST_P(DeviceLayers, ImagePatchesAreTheHostsWithChannelsOfZeros) {
+TEST_P(DeviceLayers, ImagePatchesEqualTheHostsWithZeroChannels) {
   const at::Tensor images =
       at::arange(3 * 2 * 3 * 10 * 13, at::kInt).remainder(251).to(at::kByte).reshape({3, 2, 3, 10, 13});
   for (const int64_t patch_px : {1, 2, 3, 4, 8, 12}) {

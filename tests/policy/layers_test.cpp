@@ -35,7 +35,7 @@ TEST(ImagePatches, PutEachPixelIntoAChannelAndPadWithBlack) {
   EXPECT_TRUE(image_patches(images, 1, at::kFloat).equal(images.transpose(0, 1).flatten(0, 1).to(at::kFloat)));
 }
 
-TEST(ImagePatches, AOneByOneConvolutionOfThemIsOneOfTheImageWithTheirStride) {
+TEST(ImagePatches, AOneByOneConvolutionEqualsAStridedConvolutionOfTheImage) {
   const at::Tensor images = at::arange(3 * 6 * 8, at::kInt).remainder(13).to(at::kByte).reshape({1, 1, 3, 6, 8});
   const at::Tensor weight = at::arange(4 * 3 * 2 * 2, at::kDouble).sin().reshape({4, 3, 2, 2});
   const at::Tensor expected =
@@ -46,7 +46,7 @@ TEST(ImagePatches, AOneByOneConvolutionOfThemIsOneOfTheImageWithTheirStride) {
 
 constexpr float kUnit_m = kScalePosition_m;
 
-TEST(RowFeatures, OfAPointAreNearCoordinatesAndTheBearing) {
+TEST(RowFeatures, APointHasNearCoordinatesAndItsBearing) {
   // A row with two points, (3, -4) m and (0, 20) m, and a number that belongs to no point. 120 m are 1.
   const at::Tensor row = at::tensor({3.0 / 120, -4.0 / 120, 0.0, 20.0 / 120, 0.5}, at::kDouble).unsqueeze(0);
   const at::Tensor features = row_features(row, {.points = 2, .position_unit_m = kUnit_m}, at::kDouble);
@@ -58,7 +58,7 @@ TEST(RowFeatures, OfAPointAreNearCoordinatesAndTheBearing) {
   }
 }
 
-TEST(RowFeatures, OfAPointTellAMetreApartNearAndStayWithinOneFar) {
+TEST(RowFeatures, PointFeaturesResolveAMetreNearbyAndAreAtMostOne) {
   const at::Tensor features = row_features(at::tensor({0.0f, 1.0f / 120, 100.0f, -100.0f}).view({2, 2}),
                                            {.points = 1, .position_unit_m = kUnit_m}, at::kFloat);
   EXPECT_GT(features[0][1].item<float>(), 0.19f);
@@ -71,7 +71,7 @@ at::Tensor segment_row(double x_m, double y_m, double half_length_m, double head
                     at::kDouble);
 }
 
-TEST(RowFeatures, OfASegmentAreTheOffsetAlongItAndTheDistanceToItsLineAtTwoScales) {
+TEST(RowFeatures, ASegmentHasOffsetAlongItAndDistanceToItsLineAtTwoScales) {
   const at::Tensor rows = at::stack({
       segment_row(6, 1.75, 5, 0),       // ahead, to the left: its line passes 1.75 m left of the ego
       segment_row(6, 1.75, 5, kPi),     // the same line in the other direction, which sees the ego on its left
@@ -143,7 +143,7 @@ void expect_as_in_double(const Layer& layer, const Layer& plain, const std::vect
   at::set_num_threads(threads);
 }
 
-TEST(HostLayers, LinearGeluIsAtens) {
+TEST(HostLayers, LinearGeluMatchesAten) {
   for (const int64_t out : {5, 64}) {
     expect_as_in_double([](const auto& in) { return linear_gelu(in[0], in[1], in[2]); },
                         [](const auto& in) { return at::gelu(at::linear(in[0], in[1], in[2])); },
@@ -151,7 +151,7 @@ TEST(HostLayers, LinearGeluIsAtens) {
   }
 }
 
-TEST(HostLayers, GeluKeepsItsEndsAndWhatIsNotFinite) {
+TEST(HostLayers, GeluHandlesLargeAndNonFiniteInputs) {
   const float infinity = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
   const at::Tensor x = at::tensor({0.0f, 50.0f, -50.0f, 1e30f, infinity, nan, 1e-20f, -1e-20f}).unsqueeze(1);
   const at::Tensor got = linear_gelu(x, at::ones({1, 1}), at::zeros({1})).squeeze(1);
@@ -166,7 +166,7 @@ TEST(HostLayers, GeluKeepsItsEndsAndWhatIsNotFinite) {
   EXPECT_NEAR(y[7], -5e-21, 1e-26);
 }
 
-TEST(HostLayers, ConvolveGeluIsAtens) {
+TEST(HostLayers, ConvolveGeluMatchesAten) {
   struct Case {
     int64_t in, out, kernel, stride, height, width, images;
   };
@@ -185,7 +185,7 @@ TEST(HostLayers, ConvolveGeluIsAtens) {
   }
 }
 
-TEST(HostLayers, ConvolveGeluOfImagesWithoutGradientsIsAtens) {
+TEST(HostLayers, ConvolveGeluOfImagesWithoutGradientsMatchesAten) {
   for (const int64_t out : {8, 16, 32}) {
     const at::Tensor images = float_numbers({9, 3, 9, 14}, 0).to(at::kFloat).contiguous(at::MemoryFormat::ChannelsLast);
     const auto plain = [&images](const auto& in) {
@@ -220,7 +220,7 @@ TEST(HostLayers, DirectConvolutionsHaveTheSameBitsByVectorsOfAnyWidth) {
   }
 }
 
-TEST(HostLayers, LargestEmbeddingIsTheMaximumOverTheMembersThatThereAre) {
+TEST(HostLayers, LargestEmbeddingIsTheMaximumOverPresentMembers) {
   const int64_t sets = 40, max_members = 23;
   const at::Tensor members = float_numbers({sets, max_members, 7}, 0.1),
                    counts = at::arange(sets, at::kInt).remainder(max_members + 1);
@@ -245,7 +245,7 @@ TEST(HostLayers, LargestEmbeddingIsTheMaximumOverTheMembersThatThereAre) {
   }
 }
 
-TEST(HostLayers, LargestEmbeddingGivesWayToNoNumberThatIsNone) {
+TEST(HostLayers, LargestEmbeddingPropagatesNanOfMembers) {
   at::Tensor members = at::zeros({1, 3, 2});
   members[0][1][0] = std::numeric_limits<float>::quiet_NaN();
   const at::Tensor one = at::ones({1, 2});

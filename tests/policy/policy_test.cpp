@@ -53,7 +53,7 @@ double scalar_of(const Policy& policy, const Observation& o, bool with_gradient)
 }
 
 // Images as u8, and as the patches that renderers draw.
-TEST(PolicyPatches, GiveTheBitsThatImagesGive) {
+TEST(PolicyPatches, GiveTheSameBitsAsImages) {
   PolicySection config = tiny_section(Modality::perspective);
   config.conv_kernels = {1, 3};
   const Observation images = observation(Modality::perspective, 3).map([](const at::Tensor& t) {
@@ -211,7 +211,7 @@ int64_t inputs_of(const Policy& policy, const std::string& group) {
   return -1;
 }
 
-TEST_P(BothModalities, ReadsFeaturesOfPointsBesideTheirCoordinates) {
+TEST_P(BothModalities, ReadsFeaturesOfPointsInAdditionToCoordinates) {
   PolicySection config;
   config.modality = GetParam();
   const PolicyNetwork policy(config, 4, 1);
@@ -224,7 +224,7 @@ TEST_P(BothModalities, ReadsFeaturesOfPointsBesideTheirCoordinates) {
   }
 }
 
-TEST(Policy, ReadsItsPlaceBesideLanesBoundariesAndWalls) {
+TEST(Policy, ReadsItsOffsetFromLanesBoundariesAndWalls) {
   PolicySection config;
   config.modality = Modality::vector;
   config.segment_features = true;
@@ -319,7 +319,7 @@ TEST(Policy, ScaledLogitsAreTheSameTimesAFactor) {
   EXPECT_TRUE(after.value.equal(before.value));
 }
 
-TEST(Policy, AgentsOfABatchDoNotMix) {
+TEST(Policy, AgentsOfABatchAreIndependent) {
   const PolicyNetwork policy(tiny_section(Modality::perspective), 3, 5, at::kDouble);
   const at::NoGradGuard no_grad;
   const Observation o = observation(Modality::perspective, 3);
@@ -328,7 +328,7 @@ TEST(Policy, AgentsOfABatchDoNotMix) {
   EXPECT_LT((all[2] - last[0]).abs().max().item<double>(), 1e-12);
 }
 
-TEST(Policy, EveryCameraCounts) {
+TEST(Policy, EveryCameraAffectsTheOutput) {
   const PolicyNetwork policy(tiny_section(Modality::perspective), 3, 5, at::kDouble);
   const at::NoGradGuard no_grad;
   const Observation o = observation(Modality::perspective, 1);
