@@ -1,4 +1,4 @@
-"""The realism score once more, in NumPy, from the published definition alone (docs/explanation/realism.md).
+"""A second implementation of the realism score, in NumPy, from only the published definition (docs/explanation/realism.md).
 
 It shares no code and no method with evaluation/realism*: boxes by Minkowski sums of polygons, edges by brute force over whole
 polylines, the sides of corners by their turn, histograms by np.histogram. It reads scenes by to_arrays().

@@ -16,7 +16,7 @@ import pytest
 import pictura
 
 
-def test_numpy_and_dlpack_see_the_simulators_memory(make, idle):
+def test_numpy_and_dlpack_share_the_simulators_memory(make, idle):
     simulator = make()
     ego = simulator.observations["ego"]
     views = [np.asarray(ego), ego.numpy(), np.from_dlpack(ego)]
@@ -27,7 +27,7 @@ def test_numpy_and_dlpack_see_the_simulators_memory(make, idle):
     assert steps[0] == before[0] + 1
 
 
-def test_what_lends_lives_as_long_as_what_it_lent(make, idle):
+def test_arrays_keep_their_simulator_alive(make, idle):
     simulator = make()
     result = simulator.step(idle(simulator))
     held = [np.asarray(simulator.observations["lanes"]), np.from_dlpack(simulator.state["x_m"]), result.reward.numpy()]
@@ -40,7 +40,7 @@ def test_what_lends_lives_as_long_as_what_it_lent(make, idle):
     del capsule
 
 
-def test_dlpack_speaks_both_versions(make):
+def test_dlpack_supports_both_versions(make):
     simulator = make()
     ego, x_m = simulator.observations["ego"], simulator.state["x_m"]
     assert ego.__dlpack_device__() == (1, 0)
@@ -62,7 +62,7 @@ def test_dlpack_speaks_both_versions(make):
             ego.__dlpack__(**{name: value})
 
 
-def test_strided_arrays_are_lent_with_their_strides(make, idle):
+def test_shared_arrays_keep_their_strides(make, idle):
     simulator = make()
     result = simulator.step(idle(simulator))
     terms = result.reward_terms
@@ -72,7 +72,7 @@ def test_strided_arrays_are_lent_with_their_strides(make, idle):
     assert result.valid.numpy().dtype == bool
 
 
-def test_torch_takes_and_gives_without_a_copy(make):
+def test_torch_shares_memory_without_a_copy(make):
     torch = pytest.importorskip("torch")
     simulator = make()
     ego = simulator.observations["ego"].torch()
@@ -103,7 +103,7 @@ def refusal(simulator, actions) -> str:
     return str(error.value)
 
 
-def test_wrong_actions_are_refused_by_name(make):
+def test_errors_name_wrong_actions(make):
     simulator = make()
     good = np.zeros(24, np.int32)
     expected = "step: actions: expected i32 [12] on cpu"
@@ -141,7 +141,7 @@ class Odd:
         return self.lies.get("device", (1, 0))
 
 
-def test_liars_are_refused(make):
+def test_inconsistent_array_protocols_are_refused(make):
     simulator = make()
     good = np.full(12, pictura.IDLE_ACTION, np.int32)
     simulator.step(Odd(good))
@@ -158,7 +158,7 @@ def test_liars_are_refused(make):
         simulator.step(Odd(good, capsule=used))
 
 
-def test_fuzzed_arrays_are_taken_or_refused(make):
+def test_fuzzed_arrays_are_accepted_or_refused(make):
     simulator = make()
     renderer = pictura.Renderer("cpu", pictura.Rig.paper(8, 8), num_threads=1)
     for handle, geometry in simulator.geometries.items():
@@ -236,7 +236,7 @@ class Lender:
         return new(ctypes.addressof(self.tensor), b"dltensor", None)
 
 
-def test_tensors_of_any_device_type_shape_and_stride_are_taken_or_refused(make):
+def test_tensors_of_any_device_type_shape_and_stride_are_accepted_or_refused(make):
     simulator = make()
     simulator.step(Lender([12]))
     for device, said in (((2, 0), None), ((2, 7), (1, 0)), ((1, 0), (2, 0)), ((10, 0), None), ((13, 0), (1, 0)), ((-1, -1), None)):
@@ -286,7 +286,7 @@ def test_observations_may_be_overwritten(make, idle):
     assert (written.observations["set_counts"].numpy() == kept.observations["set_counts"].numpy()).all()
 
 
-def test_letting_go_of_an_array_may_call_the_simulator(make):
+def test_array_destructors_may_call_the_simulator(make):
     simulator = make()
     called = []
 
@@ -301,7 +301,7 @@ def test_letting_go_of_an_array_may_call_the_simulator(make):
     assert len(called) == 20
 
 
-def test_objects_that_were_never_made_are_refused():
+def test_uninitialized_objects_are_refused():
     classes = [value for value in vars(pictura._pictura).values() if isinstance(value, type) and not issubclass(value, Exception)]
     refused = 0
     for its_class in classes:
@@ -318,7 +318,7 @@ def test_objects_that_were_never_made_are_refused():
     assert len(classes) > 15 and refused > 50
 
 
-def test_a_second_call_while_one_runs_is_refused(town):
+def test_concurrent_calls_of_one_simulator_are_refused(town):
     simulator = pictura.Simulator([town], [(0, 60)] * 4, num_threads=1)
     lane = pictura.Controller("lane", simulator)
     errors, actions = [], np.zeros(240, np.int32)
@@ -355,7 +355,7 @@ def run_python(code: str, **options) -> subprocess.CompletedProcess:
     return subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=120, **options)
 
 
-def test_interrupts_reach_long_calls():
+def test_interrupts_end_long_calls():
     code = """
         import os, signal, threading, time
         import pictura
@@ -397,7 +397,7 @@ def test_interrupts_end_a_render_between_views():
 
 
 @pytest.mark.parametrize("work", ["simulator.run(lane, 10**9)", "step()", "draw()", "load()"])
-def test_the_interpreter_ends_while_threads_work(work):
+def test_the_interpreter_exits_while_threads_run(work):
     code = f"""
         import threading, time
         import numpy as np
@@ -444,5 +444,5 @@ def test_forks_are_refused_or_work():
     assert "forked" in run_python(code.format(threads=2)).stdout
 
 
-def test_repr_says_what_it_is(make):
+def test_repr_describes_the_object(make):
     assert repr(make().observations["ego"]) == "<pictura.Array ego: f32 [12, 9] on cpu>"

@@ -152,7 +152,7 @@ class Claims:
         (np.zeros(3, [("a", "f4"), ("b", "O")]), "expected an array of numbers or texts"),
     ],
 )  # fmt: skip
-def test_hostile_pickles_run_nothing(tmp_path, monkeypatch, call, named):
+def test_hostile_pickles_execute_no_code(tmp_path, monkeypatch, call, named):
     monkeypatch.chdir(tmp_path)
     for protocol in (0, 2, 4, 5):
         scene = scene_of()
@@ -162,7 +162,7 @@ def test_hostile_pickles_run_nothing(tmp_path, monkeypatch, call, named):
         assert [path.name for path in tmp_path.iterdir()] == ["sd_scene.pkl"], "nothing ran"
 
 
-def test_pickles_cannot_change_what_they_name(tmp_path):
+def test_pickles_cannot_modify_named_objects(tmp_path):
     # numpy.ndarray with a state of (None, {"__setstate__": int}), which the protocol writes into the named object.
     change = b"\x80\x04cnumpy\nndarray\n(N}\x8c\x0c__setstate__cbuiltins\nint\nst\x94b."
     pickletools.dis(change, out=open(os.devnull, "w"))
@@ -171,7 +171,7 @@ def test_pickles_cannot_change_what_they_name(tmp_path):
     assert load_scenarionet(written(tmp_path, scene_of())).num_tracks == 2
 
 
-def test_pickles_that_claim_much_take_no_memory(tmp_path):
+def test_large_claimed_sizes_in_pickles_allocate_no_memory(tmp_path):
     many, huge = struct.pack("<I", 2**32 - 1), struct.pack("<Q", 2**62)
     for data in (b"Nr" + many + b"N.", b"\x8e" + huge + b"x.", b"\x96" + huge + b"x.", b"\x95" + huge + b"N.", b"\x8b\xff\xff\xff\x7fx."):
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -180,7 +180,7 @@ def test_pickles_that_claim_much_take_no_memory(tmp_path):
         assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000, data
 
 
-def test_damaged_pickles_are_named(tmp_path):
+def test_errors_name_damaged_pickles(tmp_path):
     whole = pickle.dumps(scene_of(), 4)
     draw = np.random.default_rng(1)
     refused = 0
@@ -220,7 +220,7 @@ def test_damaged_pickles_are_named(tmp_path):
         (("map_features",), {}, r"expected at least one lane, got none"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_with_a_scene_is_named(tmp_path, path, value, message):
+def test_errors_name_faults_of_a_scene(tmp_path, path, value, message):
     scene = scene_of()
     part = scene
     for key in path[:-1]:
@@ -233,7 +233,7 @@ def test_what_is_wrong_with_a_scene_is_named(tmp_path, path, value, message):
         load_scenarionet(written(tmp_path, scene))
 
 
-def test_recordings_written_in_the_format_come_back(tmp_path):
+def test_written_recordings_read_back_equal(tmp_path):
     if not os.path.isfile(FIXTURE):
         pytest.skip("PICTURA_SCENE_FIXTURE: expected the program scene_fixture")
     subprocess.run([FIXTURE, "write", str(tmp_path)], check=True)

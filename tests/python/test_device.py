@@ -36,7 +36,7 @@ def drawn(simulator, **options):
     return renderer
 
 
-def test_steps_and_images_are_those_of_the_cpu(both):
+def test_steps_and_images_equal_those_of_the_cpu(both):
     cpu, cuda = both
     assert cuda.name == "cuda" and cuda.observations["ego"].__dlpack_device__() == (2, 0)
     draw_cpu, draw_cuda = drawn(cpu), drawn(cuda)
@@ -70,7 +70,7 @@ def test_chosen_worlds_and_agents(both):
     assert cpu.state_hash() == cuda.state_hash()
 
 
-def test_what_lies_elsewhere_is_refused(both):
+def test_arrays_on_another_device_are_refused(both):
     _, cuda = both
     with pytest.raises(pictura.Error, match=r"step: actions: expected i32 \[120\] on cuda:0, got i32 \[120\] on cpu"):
         cuda.step(np.zeros(120, np.int32))
@@ -81,7 +81,7 @@ def test_what_lies_elsewhere_is_refused(both):
         cuda.check()
 
 
-def test_work_of_another_stream_is_waited_for(town):
+def test_calls_wait_for_work_of_another_stream(town):
     stream = torch.cuda.Stream()
     simulator = pictura.Simulator([town], [(0, 40)] * 64, device="cuda", stream=stream.cuda_stream)
     expected = pictura.Simulator([town], [(0, 40)] * 64, executor="cpu")
@@ -104,7 +104,7 @@ def test_memory_outlives_the_simulator(town):
     assert torch.equal(ego, copy)
 
 
-def test_a_fork_after_cuda_was_used_is_refused():
+def test_a_fork_after_use_of_cuda_is_refused():
     code = """
 import os, pictura, torch
 simulator = pictura.Simulator([pictura.Map.load("procedural:3")], [(0, 4)], device="cuda")
@@ -126,7 +126,7 @@ print(simulator.step(actions).reward.torch().shape)
 
 
 @pytest.mark.parametrize("name", ["jax", "cupy"])
-def test_others_take_it_and_act(both, name):
+def test_other_array_libraries_share_memory_and_pass_actions(both, name):
     module = pytest.importorskip(name)
     cpu, cuda = both
     take, make = (module.dlpack.from_dlpack, module.numpy.asarray) if name == "jax" else (module.from_dlpack, module.asarray)

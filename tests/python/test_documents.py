@@ -1,4 +1,4 @@
-"""Pages about Python: their code runs, the card of the environments is what its script writes, and docstrings have examples that are true."""
+"""Pages about Python: their code runs, the environment card is up to date, and docstring examples are correct."""
 
 import doctest
 import importlib
@@ -20,7 +20,7 @@ DOCS = ROOT / "docs"
 HAS_TRAINING = all(importlib.util.find_spec(name) is not None for name in ("torch", "pictura._built_torch"))
 PACKAGES = {"envs.pettingzoo_env": "pettingzoo", "envs.torchrl_env": "torchrl", "envs.gymnasium": "gymnasium", "make_vec": "gymnasium",
             "torch.": "torch", "rerun.": "rerun"}  # fmt: skip
-# Of the extension beside torch.
+# Members of the extension that is built with torch.
 OF_TRAINING = ("PolicySession", "evaluate", "evaluate_robust", "evaluate_scenes", "probe_corner", "probe_pedestrian", "probe_removal", "train", "make_vec_for")
 
 
@@ -37,7 +37,7 @@ def run(blocks: list[str], page: str, names: dict[str, object] | None = None) ->
 
 @pytest.fixture
 def checkout(tmp_path, monkeypatch):
-    """An empty folder with what the pages name of a checkout."""
+    """Empty folder with the files of a checkout that the pages name."""
     for name in ("models", "configs", "bench"):
         (tmp_path / name).symlink_to(ROOT / name)
     monkeypatch.chdir(tmp_path)
@@ -53,7 +53,7 @@ def test_the_tutorial_runs(checkout):
     assert len((DOCS / "tutorials/python.md").read_text().split()) < 1500
 
 
-def test_what_is_not_there_is_observed(make):
+def test_the_observation_query_example_runs(make):
     names = run(blocks_of("reference/python/simulator.md"), "simulator.md", {"np": np, "pictura": pictura, "simulator": make(8)})
     assert names["answers"]["partners"].shape == (3, 16, 8)
 
@@ -69,7 +69,7 @@ def test_a_released_policy_is_loaded_driven_and_exported(checkout):
 
 
 @pytest.mark.skipif(not HAS_TRAINING, reason="needs a package that was built beside torch")
-def test_a_network_of_your_own_learns_from_images(checkout):
+def test_the_custom_network_example_learns_from_images(checkout):
     pytest.importorskip("gymnasium")
     names = run(blocks_of("how-to/own_network.md"), "own_network.md")
     assert names["report"]["agent_steps"] > 200 and (checkout / "network.pt").exists()
@@ -111,7 +111,7 @@ def test_how_to_pages_are_short(page):
     assert len((DOCS / f"how-to/{page}.md").read_text().split()) < 900
 
 
-def test_a_metric_of_ones_own_is_counted(checkout):
+def test_the_custom_metric_example_counts(checkout):
     names: dict[str, object] = {}
     needs = (None, None, None, None, "mcap")
     for block, module in zip(blocks_of("how-to/own_metric.md"), needs, strict=True):
@@ -122,7 +122,7 @@ def test_a_metric_of_ones_own_is_counted(checkout):
     assert names["report"]["cases"] > 100 and names["report"]["rows"][0]["abs_d_p_brake"] > 0
 
 
-def test_a_reward_of_your_own_is_paid(capsys):
+def test_the_custom_reward_example_trains(capsys):
     pytest.importorskip("gymnasium")
     names = run(blocks_of("how-to/own_reward.md"), "docs/how-to/own_reward.md")
     straight, weaving = (float(line.split()[1]) for line in capsys.readouterr().out.splitlines()[-2:])
@@ -144,7 +144,7 @@ def test_the_benchmarks_function_drives(monkeypatch):
     assert names["report"]["rows"][0]["vehicle_episodes"] > 0
 
 
-def test_the_card_is_what_the_lists_say():
+def test_the_environment_card_is_up_to_date():
     pytest.importorskip("gymnasium")
     out = subprocess.run([sys.executable, ROOT / "scripts/environment_card", "--check"], capture_output=True, text=True, timeout=120)
     assert (out.returncode, out.stdout, out.stderr) == (0, "", ""), "run scripts/environment_card"
@@ -163,7 +163,7 @@ def test_the_card_has_every_number_of_actions_and_arguments():
     assert len(re.findall(r"^\| \d+( \(idle\))? \| \(\d, \d\) \|", text, re.M)) == pictura.NUM_ACTIONS
 
 
-def test_actions_are_the_jerks_that_the_card_names(town):
+def test_actions_apply_the_jerks_of_the_card(town):
     from pictura.envs import batch
 
     fixed = {name: 1.0 for name in ("throttle", "steer", "acceleration")}
@@ -180,7 +180,7 @@ def test_actions_are_the_jerks_that_the_card_names(town):
         assert lateral[slot] == pytest.approx(batch.LATERAL_JERKS_MPS3[k], abs=1e-3)
 
 
-# What the pages of the reference name.
+# Names on the pages of the reference.
 PUBLIC = [
     name for page in sorted((DOCS / "reference/python").glob("*.md")) for name in re.findall(r"^::: (pictura\S+)", page.read_text(), re.M)
 ]
@@ -197,7 +197,7 @@ def test_the_reference_has_every_public_name():
 
 
 @pytest.mark.parametrize("name", PUBLIC)
-def test_a_docstring_has_an_example_that_is_true(name, checkout, monkeypatch):
+def test_docstring_examples_are_correct(name, checkout, monkeypatch):
     short = name.removeprefix("pictura.")
     for part, package in PACKAGES.items():
         if short.startswith(part):
@@ -222,7 +222,7 @@ def test_a_docstring_has_an_example_that_is_true(name, checkout, monkeypatch):
     assert not said, "".join(said)
 
 
-def test_help_of_make_vec_is_the_page():
+def test_help_of_make_vec_matches_its_page():
     text = pydoc.plain(pydoc.render_doc(pictura.make_vec))
     for word in ("preset", "num_agents", "Raises", "UsageError", ">>> envs = ", "[slots, ...]"):
         assert word in text, word

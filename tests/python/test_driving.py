@@ -1,4 +1,4 @@
-"""Saved policies with and without torch: what computes them, what they give, and what is said where it is missing."""
+"""Saved policies with and without torch: their implementations, their results, and errors for missing packages."""
 
 import importlib.util
 import pathlib
@@ -59,7 +59,7 @@ def test_policies_drive_and_are_evaluated():
 
 
 @pytest.mark.skipif(not HAS_DRIVING, reason="built with torch alone")
-def test_no_torch_is_loaded_where_none_is_usable():
+def test_an_unusable_torch_is_not_loaded():
     vector = str(next(path for path in MODELS if path.stem == "vector"))
     code = f"""
         import sys
@@ -83,7 +83,7 @@ def test_no_torch_is_loaded_where_none_is_usable():
     assert out.stdout.startswith("pictura.train: ") and "pip install" in out.stdout
 
 
-def test_the_minor_version_of_torch_chooses_and_others_are_refused_with_the_remedy(monkeypatch):
+def test_torch_minor_version_selects_the_build_or_gives_a_remedy(monkeypatch):
     monkeypatch.setattr(_load_training, "built_torches", lambda: ["2.11", "2.15"])
     for installed, usable in (("2.11.0+cu130", "2.11"), ("2.11.2", "2.11"), ("2.15.0+cpu", "2.15"), ("2.1.0", None), ("2.12.1", None), (None, None)):
         monkeypatch.setattr(_load_training, "installed_torch", lambda its=installed: its)
@@ -99,7 +99,7 @@ def test_the_minor_version_of_torch_chooses_and_others_are_refused_with_the_reme
         _load_training.load("train")
 
 
-def test_the_command_says_what_is_missing(monkeypatch, tmp_path):
+def test_the_command_names_missing_packages(monkeypatch, tmp_path):
     from pictura import __main__ as command
 
     monkeypatch.setattr(_load_training, "folder", lambda: tmp_path)
@@ -115,6 +115,6 @@ def test_the_command_says_what_is_missing(monkeypatch, tmp_path):
         command.main()
 
 
-def test_a_name_that_is_not_there_is_no_attribute():
+def test_an_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'trane'"):
         pictura.trane  # noqa: B018

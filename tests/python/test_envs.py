@@ -26,7 +26,7 @@ SMALL = {"rig": pictura.Rig.paper(16, 9)}
     ],
     ids=["vector", "flat", "images", "both"],
 )
-def test_drive_passes_gymnasiums_checker(options):
+def test_drive_passes_the_gymnasium_checker(options):
     env = gymnasium.make("pictura/Drive-v0", num_agents=6, **options)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*(infinity|maximum|minimum|flattened).*")
@@ -46,7 +46,7 @@ def test_drive_renders_and_ends():
         env.unwrapped.step(12)
 
 
-def test_others_drive_while_the_agent_stands():
+def test_other_agents_drive_while_the_agent_stands():
     env = gymnasium.make("pictura/Drive-v0", num_agents=8, pedestrian_fraction=0.0).unwrapped
     env.reset(seed=3)
     for _ in range(40):
@@ -62,7 +62,7 @@ def vector(autoreset="next_step", **options):
 
 @pytest.mark.parametrize("observation", ["vector", "flat", "images", "both"])
 @pytest.mark.parametrize("actions", ["discrete", "multi_discrete"])
-def test_vector_spaces_hold_what_is_returned(observation, actions):
+def test_vector_spaces_contain_returned_values(observation, actions):
     env = vector(observation=observation, actions=actions, **(SMALL if observation in ("images", "both") else {}))
     assert env.num_envs == 24
     seen, info = env.reset(seed=3)
@@ -76,7 +76,7 @@ def test_vector_spaces_hold_what_is_returned(observation, actions):
 
 
 @pytest.mark.parametrize("autoreset", ["next_step", "same_step"])
-def test_vector_seeds_decide_everything(autoreset):
+def test_vector_seeds_determine_all_results(autoreset):
     runs = []
     for seed in (5, 5, 6):
         env = vector(autoreset)
@@ -142,7 +142,7 @@ def test_statistics_equal_the_simulators_totals(autoreset):
     assert env.statistics["finished_agent_episodes"] > 50 and env.statistics["off_road"] > 0
 
 
-def test_gymnasiums_wrappers_take_it():
+def test_gymnasium_wrappers_accept_the_environment():
     from gymnasium.wrappers.vector import DictInfoToList, FlattenObservation, RecordEpisodeStatistics
 
     for autoreset in ("next_step", "same_step"):
@@ -172,7 +172,7 @@ def test_the_vector_form_is_registered():
     forked.close()
 
 
-def test_presets_are_the_configurations_worlds():
+def test_presets_equal_worlds_of_the_configurations():
     envs = pictura.make_vec(preset="demo", seed=1)
     simulator = envs.batch.simulator
     assert [town.name for town in simulator.maps] == ["procedural:0"] and simulator.episode_steps == 600
@@ -189,7 +189,7 @@ def test_presets_are_the_configurations_worlds():
 
 
 @pytest.mark.parametrize("preset", ["town", "paper"])
-def test_presets_of_whole_towns_take_other_maps(preset):
+def test_presets_of_whole_towns_accept_other_maps(preset):
     envs = pictura.make_vec(["procedural:1", "procedural:2"], preset=preset, num_envs=40, seed=3)
     seen, _ = envs.reset(seed=1)
     size = {"town": (18, 32), "paper": (54, 96)}[preset]
@@ -204,7 +204,7 @@ def test_ranges_of_presets_are_expanded():
     assert options["maps"][0] == "Town01" and options["maps"][-12:] == [f"procedural:{seed}" for seed in range(1000, 1012)]
 
 
-def test_wrong_options_are_named():
+def test_errors_name_wrong_options():
     for options, name in (
         ({"observation": "smells"}, "observation"),
         ({"actions": "continuous"}, "actions"),
@@ -239,7 +239,7 @@ def test_wrong_options_are_named():
 
 
 @pytest.mark.parametrize("array", ["numpy", "torch"])
-def test_wrong_actions_never_become_right_ones(array):
+def test_wrong_actions_are_refused_without_wrapping(array):
     if array == "torch":
         pytest.importorskip("torch")
     env = vector(array=array)
@@ -258,7 +258,7 @@ def test_wrong_actions_never_become_right_ones(array):
     env.step(np.tile([3, 2], (24, 1)))
 
 
-def test_views_without_copies_are_the_simulators_memory():
+def test_uncopied_observations_share_the_simulators_memory():
     env = vector(copy=False)
     seen, _ = env.reset(seed=1)
     assert seen["ego"].ctypes.data == env.batch.simulator.observations["ego"].numpy().ctypes.data
@@ -294,7 +294,7 @@ STREET = """<OpenDRIVE><header revMajor="1" revMinor="6"/><road id="1" junction=
 </right></laneSection></lanes></road></OpenDRIVE>"""
 
 
-def test_agents_that_enter_a_road_have_names_of_their_own():
+def test_entering_agents_get_new_names():
     pytest.importorskip("pettingzoo")
     from pictura.envs.pettingzoo_env import DriveParallelEnv
 
@@ -321,7 +321,7 @@ def drive_on(speed):
     return np.where(speed < 4, 10, 7)
 
 
-def test_same_step_has_the_last_observation_of_agents_that_leave():
+def test_same_step_has_the_last_observation_of_leaving_agents():
     env = pictura.make_vec(
         pictura.Map.from_text(STREET), 2, pedestrian_fraction=0, cyclist_fraction=0, parked_cars=0, autoreset="same_step"
     )
@@ -337,7 +337,7 @@ def test_same_step_has_the_last_observation_of_agents_that_leave():
     pytest.fail("nobody left the street")
 
 
-def test_torchrl_knows_agents_that_leave():
+def test_torchrl_marks_leaving_agents():
     pytest.importorskip("torchrl")
     import torch
 
@@ -371,7 +371,7 @@ def test_torchrl_passes_its_check():
     assert rollout["next", "done"].sum() >= 3 and rollout["agents", "mask"].any()
 
 
-def test_pufferlibs_contract():
+def test_pufferlib_interface():
     from pictura.envs.puffer_env import DrivePufferEnv
 
     env = DrivePufferEnv(num_agents=6, num_worlds=2, episode_steps=20, num_threads=1)

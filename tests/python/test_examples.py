@@ -55,7 +55,7 @@ def test_ppo(observation):
 
 
 def test_ppo_learns_the_demo_in_a_minute(tmp_path):
-    """Seed 1 rises from -1.8 to -0.2 within a quarter of its steps; one that learns nothing stays below -1.8."""
+    """Seed 1 rises from -1.8 to -0.2 within a quarter of its steps; a policy that learns nothing stays below -1.8."""
     torch = pytest.importorskip("torch")
     pytest.importorskip("gymnasium")
     options = ["--total-timesteps", "31000", "--out", str(tmp_path / "ppo")]
@@ -74,7 +74,7 @@ def test_ppo_learns_the_demo_in_a_minute(tmp_path):
     assert panel.series[0].y[-1] == returns[-1]
 
 
-def test_the_tours_cells_run(tmp_path, monkeypatch):
+def test_the_tour_notebook_runs(tmp_path, monkeypatch):
     pytest.importorskip("gymnasium")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "models").symlink_to(EXAMPLES.parent / "models")

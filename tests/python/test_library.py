@@ -29,7 +29,7 @@ def test_a_map_has_facts_geometry_and_a_picture(town):
     assert picture.shape == (150, 200, 3) and len(np.unique(picture)) > 10
 
 
-def test_maps_from_text_name_what_is_wrong(tmp_path):
+def test_errors_name_faults_of_map_text(tmp_path):
     with pytest.raises(pictura.Error, match="nowhere.xodr"):
         pictura.Map.from_text("<OpenDRIVE", "nowhere.xodr")
     with pytest.raises(pictura.UsageError, match="Town99"):
@@ -38,13 +38,13 @@ def test_maps_from_text_name_what_is_wrong(tmp_path):
         pictura.Map.load("Town99")
 
 
-def test_what_cannot_be_pickled_says_so_in_every_protocol(town):
+def test_unpicklable_objects_raise_for_every_protocol(town):
     for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
         with pytest.raises(TypeError, match="cannot pickle 'pictura._pictura.Map' object"):
             pickle.dumps(town, protocol=protocol)
 
 
-def test_the_papers_rig_and_ones_own():
+def test_the_papers_rig_and_custom_rigs():
     rig = pictura.Rig.paper(48, 27)
     assert len(rig) == 4 and rig.cameras[0].width_px == 48
     assert rig.cameras[0].focal_x_px == pytest.approx(1545 * 48 / 1920)
@@ -55,7 +55,7 @@ def test_the_papers_rig_and_ones_own():
         pictura.Rig([pictura.Camera("wide", 0, 10)])
 
 
-def test_a_scene_of_arrays_is_drawn_as_it_stands():
+def test_a_scene_of_arrays_is_drawn_unchanged():
     rig = pictura.Rig([pictura.Camera("front", 64, 48, position_m=(0, 0, 1.5))])
     renderer = pictura.Renderer("cpu", rig, num_threads=1)
     renderer.upload(0, pictura.Geometry([([[0, -2, 0], [50, -2, 0]], 0.3, (1, 1, 1))]))
@@ -94,7 +94,7 @@ def test_scene_files(tmp_path):
         pictura.SceneFile(str(path))
 
 
-def test_what_does_not_fit_a_renderer_is_named(make):
+def test_errors_name_scenes_that_do_not_fit_a_renderer(make):
     simulator = make(3)
     renderer = pictura.Renderer("cpu", pictura.Rig.paper(16, 9), num_threads=1)
     with pytest.raises(pictura.Error, match="geometr"):
@@ -114,7 +114,7 @@ def test_what_does_not_fit_a_renderer_is_named(make):
         renderer.render(simulator.scene, views)
 
 
-def test_many_views_drawn_in_parts_are_the_same_images(make):
+def test_many_views_drawn_in_parts_give_equal_images(make):
     simulator = make()
     renderer = pictura.Renderer("cpu", pictura.Rig.paper(8, 6), num_threads=2)
     for handle, geometry in simulator.geometries.items():
@@ -134,7 +134,7 @@ def test_many_views_drawn_in_parts_are_the_same_images(make):
         renderer.render(simulator.scene, views)
 
 
-def test_images_of_the_simulator_are_those_of_the_command_line_renderer(make):
+def test_simulator_images_equal_those_of_the_render_command(make):
     simulator = make(4)
     renderer = pictura.Renderer("cpu", num_threads=1)
     for handle, geometry in simulator.geometries.items():
@@ -220,7 +220,7 @@ def boxes_of(simulator) -> np.ndarray:
     return np.asarray(simulator.scene.boxes).view(pictura.BOX_DTYPE)[:, 0]
 
 
-def test_observations_without_changes_are_the_simulators(make):
+def test_queries_without_changes_equal_the_simulators_observations(make):
     simulator = make(12, worlds=2)
     for step in range(5):
         simulator.step(actions_of(step, 24))
@@ -259,7 +259,7 @@ def test_boxes_are_hidden_and_inserted(make):
     assert all((out[name] == array.numpy()).all() for name, array in answers.items())
 
 
-def test_queries_that_cannot_be_are_named(make):
+def test_errors_name_invalid_queries(make):
     simulator = make(4)
     for queries, message in [
         (pictura.make_queries([4]), "slot"),
@@ -298,7 +298,7 @@ def test_reward_terms_sum_to_rewards_and_totals(make):
     assert totals["agent_steps"] > 100
 
 
-def test_the_lane_keeper_drives_and_shares(make):
+def test_the_lane_keeper_drives_alone_and_shared(make):
     simulator = make(8, pedestrian_fraction=0.0)
     lane = pictura.Controller("lane", simulator)
     simulator.run(lane, 50)
@@ -312,7 +312,7 @@ def test_the_lane_keeper_drives_and_shares(make):
 
 
 @pytest.mark.parametrize("name", ["random", "idm_lanes"])
-def test_a_controller_drives_in_the_worlds_that_it_was_made_for(make, name):
+def test_a_controller_is_refused_in_other_worlds(make, name):
     simulator = make(8)
     controller = pictura.Controller(name, simulator)
     simulator.run(controller, 3)
@@ -332,7 +332,7 @@ def test_conditioning_is_set_by_name(town):
         pictura.Simulator([town], [(0, 8)], conditioning={"colision": 2.5})
 
 
-def test_what_cannot_be_simulated_is_named(town):
+def test_errors_name_invalid_worlds(town):
     numbers = r"integers \(map, agents\) or \(map, agents, global world\)"
     for worlds, message in (
         ([(0, 4, -1)], f"world 0: expected {numbers}, got \\(0, 4, -1\\)"),
@@ -366,7 +366,7 @@ def test_what_cannot_be_simulated_is_named(town):
 
 
 @pytest.mark.parametrize("executor", ["auto", "cpu"])
-def test_a_device_that_is_not_there_is_refused(town, executor):
+def test_an_absent_device_is_refused(town, executor):
     device = "cuda:99"  # exists on no machine
     with pytest.raises(pictura.Error, match=device):
         pictura.Simulator([town], [(0, 4)], executor=executor, device=device)
@@ -374,7 +374,7 @@ def test_a_device_that_is_not_there_is_refused(town, executor):
         pictura.Renderer(executor, device=device)
 
 
-def test_other_worlds_are_those_of_a_new_simulator(make, town):
+def test_replaced_worlds_equal_a_new_simulators(make, town):
     simulator, expected = make(6, worlds=2), make(9, worlds=4, seed=3)
     old = simulator.observations["ego"].numpy()
     kept = old.copy()
@@ -391,7 +391,7 @@ def test_other_worlds_are_those_of_a_new_simulator(make, town):
     assert simulator.num_slots == 6
 
 
-def test_the_command_comes_along():
+def test_the_package_includes_the_command():
     folder = __import__("pathlib").Path(pictura.__file__).parent
     if not list((folder / "bin").glob("**/pictura")):
         pytest.skip("this package was built without the command")

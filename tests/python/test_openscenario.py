@@ -29,7 +29,7 @@ def pose(position: ET.Element) -> np.ndarray:
 
 
 def check(scene: pictura.Scenario, root: ET.Element) -> int:
-    """Every box of the recording is where and when the file has it; returns how many states were compared."""
+    """Checks the pose and time of every recorded box in the file. Returns the number of compared states."""
     tracks, start = scene.tracks(), scene.start_step
     objects = {item.get("name"): item for item in root.iterfind("Entities/ScenarioObject")}
     groups = {item.get("name"): item for item in root.iterfind("Storyboard/Story/Act/ManeuverGroup")}
@@ -63,7 +63,7 @@ def check(scene: pictura.Scenario, root: ET.Element) -> int:
 
 
 @pytest.mark.parametrize("start_step", [0, 30])
-def test_boxes_are_where_the_recording_has_them(scene, tmp_path, start_step):
+def test_boxes_have_their_recorded_poses(scene, tmp_path, start_step):
     later = scene.starting_at(start_step)
     openscenario.write(later, tmp_path / "a.xosc", road_network="map.xodr")
     root = ET.parse(tmp_path / "a.xosc").getroot()
@@ -92,7 +92,7 @@ def test_a_recorded_drive_is_written(scene, tmp_path):
     assert check(drive, ET.parse(tmp_path / "drive.xosc").getroot()) > 100
 
 
-def test_the_schema_takes_it(scene, tmp_path):
+def test_written_files_validate_against_the_schema(scene, tmp_path):
     checker = importlib.util.find_spec("qc_openscenario")
     if checker is None or importlib.util.find_spec("lxml") is None:
         pytest.skip("asam-qc-openscenarioxml: expected it, with the schema")

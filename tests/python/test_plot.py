@@ -44,7 +44,7 @@ def expect_refused(message, function, *arguments, **options):
 # ---- runs
 
 
-def test_seeds_of_one_configuration_are_a_mean_with_a_band_where_all_of_them_are(tmp_path):
+def test_seeds_of_one_configuration_are_a_mean_with_a_band(tmp_path):
     town = run_folder(tmp_path / "town_s1", 1, "0,0,1 100,10,1 200,20,1"), run_folder(tmp_path / "town_s2", 2, "100,4,1 300,8,1")
     other = run_folder(tmp_path / "other", 1, "0,5,1 50,6,1", "a = 2")
     chart = goals(town[0], other, town[1])
@@ -66,25 +66,25 @@ def test_seeds_of_one_configuration_are_a_mean_with_a_band_where_all_of_them_are
     expect_refused("other/config.toml: expected beside progress.csv", goals, other)
 
 
-def test_a_mean_has_a_gap_where_a_seed_has_no_number(tmp_path):
+def test_a_mean_has_a_gap_at_missing_values(tmp_path):
     runs = run_folder(tmp_path / "s1", 1, "0,nan,1 10,1,1 20,1,1"), run_folder(tmp_path / "s2", 2, "0,3,1 10,3,1 20,3,1")
     ((_, y),) = lines_of(goals(*runs)).values()
     assert math.isnan(y[0]) and y[1:] == [2, 2]
 
 
-def test_hours_are_those_of_collecting_and_improving(tmp_path):
+def test_hours_are_the_sum_of_collecting_and_improving(tmp_path):
     chart = goals(run_folder(tmp_path / "s1", 1, "0,1,1792 10,2,3592"), x="hours")
     assert chart.panels[0].x_label.endswith("(h)")
     assert chart.panels[0].series[0].x == pytest.approx([0.5, 1.5])
 
 
-def test_many_updates_are_few_points(tmp_path):
+def test_many_updates_are_thinned(tmp_path):
     (series,) = goals(run_folder(tmp_path / "s1", 1, " ".join(f"{i},{i % 15},1" for i in range(3000)))).panels[0].series
     assert (len(series.x), series.x[0], series.x[-1]) == (plot.MAX_RUN_POINTS, 7, 2992)
     assert set(series.y) == {7}
 
 
-def test_names_are_those_of_folders_and_whole_where_they_are_alike(tmp_path):
+def test_names_are_folder_names_or_whole_paths_if_equal(tmp_path):
     a, b = run_folder(tmp_path / "a/run", 1, "0,1,1"), run_folder(tmp_path / "b/run", 1, "0,1,1", "a = 2")
     names = lambda *runs: [series.name for series in goals(*runs).panels[0].series]
     assert names(a + "/") == ["run"]
@@ -93,7 +93,7 @@ def test_names_are_those_of_folders_and_whole_where_they_are_alike(tmp_path):
     assert names(run_folder(tmp_path / "aa", 1, "0,1,1"), run_folder(tmp_path / "aaa", 2, "0,1,1")) == ["aa*, 2 seeds"]
 
 
-def test_what_is_missing_of_a_run_is_named(tmp_path):
+def test_errors_name_missing_data_of_a_run(tmp_path):
     a = run_folder(tmp_path / "a", 1, "0,1,1 10,1,1")
     progress = pathlib.Path(a) / "progress.csv"
     expect_refused("nowhere: expected the folder of a training run", goals, f"{tmp_path}/nowhere")
@@ -155,7 +155,7 @@ def test_lines_are_medium_traffic_in_a_band_of_all_densities(curves):
     assert [line["points"] for line in chart.facts["lines"]] == [2, 1]
 
 
-def test_distances_per_infraction_are_panels_where_rows_have_them(curves):
+def test_rows_with_distances_per_infraction_add_panels(curves):
     titles = lambda *rows: [panel.title for panel in plot.evaluation_curves(curves({"name": "a", "points": [point(1, *rows)]})).panels[4:]]
     old, both = row("medium", 1, km_per_at_fault_infraction=1), row("medium", 1, km_per_infraction=2, km_per_at_fault_infraction=3)
     assert titles(row("medium", 1)) == ["Distance per infraction"]
@@ -167,7 +167,7 @@ def test_distances_per_infraction_are_panels_where_rows_have_them(curves):
     assert panels[5].series[0].y == [1, 3]
 
 
-def test_what_is_missing_of_evaluations_is_named(curves, tmp_path):
+def test_errors_name_missing_data_of_evaluations(curves, tmp_path):
     def expect_refused_lines(message, *lines):
         expect_refused(message, plot.evaluation_curves, curves(*lines))
 
@@ -214,7 +214,7 @@ def results(tmp_path):
     return written
 
 
-def test_rates_of_rendering_are_read_from_results_of_one_benchmark_or_of_several(results):
+def test_rendering_rates_are_read_from_several_result_files(results):
     names = ["cuda 96x54 2048 egos", "cuda 32x18 2048 egos", "cuda 96x54 64 egos", "cpu 64x64 2048 egos", "cuda 32x18 2048 egos", "other"]
     rows = [{"name": name, "value": 1e5 * (i + 1)} for i, name in enumerate(names)]
     chart = plot.render_rates(results({"results": rows}))
@@ -227,14 +227,14 @@ def test_rates_of_rendering_are_read_from_results_of_one_benchmark_or_of_several
     expect_refused("results.json: expected results of a benchmark", plot.render_rates, results([]))
 
 
-def test_the_cost_of_steps_is_a_rate_turned_over(results):
+def test_step_costs_are_reciprocal_rates(results):
     names = {"cpu, 64 worlds of 4 agents": 1e6, "cpu, 64 worlds of 1 agents": 1e5, "cpu, 1 worlds of 60 agents": 2e6, "cpu, 64 worlds of 60 agents": 4e6}
     chart = plot.step_costs(results({"results": [{"name": name, "value": value} for name, value in names.items()]}))
     assert lines_of(chart, 0) == {"cpu": ([1, 4], [pytest.approx(1e4), 1000])}
     assert lines_of(chart, 1) == {"cpu": ([1, 64], [500, 250])}
 
 
-def test_rates_on_several_gpus_are_what_gpu_ranks_measured(results):
+def test_rates_on_several_gpus_are_read_from_gpu_ranks_results(results):
     def row(case, gpus, rate):
         rates = {"median": rate, "min": 0.5 * rate, "max": 2 * rate}
         return {"case": case, "gpus": gpus, "agent_steps_per_s": rates, "efficiency": rate / gpus / 1e5}
@@ -247,7 +247,7 @@ def test_rates_on_several_gpus_are_what_gpu_ranks_measured(results):
     expect_refused("expected rates of scripts/gpu_ranks", plot.rank_rates, results({}))
 
 
-def test_a_breakdown_stands_beside_the_papers(results):
+def test_a_breakdown_is_compared_with_the_papers(results):
     case, paper = "cuda 32x18 128 agents a world", {"64x36": {"total": 9.0, "rendering": 0.5}}
     rows = [{"name": f"{case}, {part}", "value": value} for part, value in {"env": 1, "rendering": 2, "total": 4, "chunk": 8}.items()]
     chart = plot.breakdown_parts(results({"results": rows}), ["env", "rendering", "total"], paper)
@@ -299,7 +299,7 @@ def test_removal_shows_occlusion_and_distances_of_hidden_users(tmp_path):
     assert set(lines_of(named, 0)) == {"an earlier a", "untrained b"}
 
 
-def test_pedestrian_shows_places_that_half_of_the_paths_have(tmp_path):
+def test_pedestrian_shows_places_in_at_least_half_of_the_paths(tmp_path):
     def row(at_m, cases, share, value, half_width=0.1):
         return {"policy": "a", "from_first_sight_m": at_m, "cases": cases, "visible_share_mean": share, **estimates(value, half_width)}
 
@@ -355,7 +355,7 @@ def test_pages_have_the_curves_of_their_path_or_pair(tmp_path):
     assert (lines_of(chart, 1), chart.panels[1].marks) == ({"a": ([0, 0.1], [2, 1])}, [(0.0, "x")])  # no walls hide the vehicle
 
 
-def test_charts_go_below_pictures(tmp_path):
+def test_charts_are_appended_below_pictures(tmp_path):
     from PIL import Image
 
     write_summary(tmp_path, "pedestrian", [], paths=1)
@@ -368,7 +368,7 @@ def test_charts_go_below_pictures(tmp_path):
     assert (tmp_path / "pedestrian.png").exists()
 
 
-def test_what_is_no_summary_is_refused(tmp_path):
+def test_files_other_than_summaries_are_refused(tmp_path):
     (tmp_path / "summary.json").write_text("[]")
     expect_refused("summary.json: expected the summary of a probe of removal, pedestrian, corner", plot.probe_means, f"{tmp_path}/summary.json")
     expect_refused("expected a key 'paths'", plot.probe_means, write_summary(tmp_path, "pedestrian", [{"from_first_sight_m": 0, "cases": 1}]))
@@ -377,7 +377,7 @@ def test_what_is_no_summary_is_refused(tmp_path):
 # ---- drawing
 
 
-def test_points_between_gaps_are_dots_and_marks_stand_above(tmp_path):
+def test_points_between_gaps_are_dots_and_marks_are_above(tmp_path):
     series = plot.Series("a", list(range(20)), [NAN, 1, NAN, 2, 2, *[3] * 14, NAN])
     panel = plot.Panel("a", "x (m)", "y (m)", [series], marks=[(5, "m")])
     axes = plot.figure(plot.Chart([panel])).axes[0]
@@ -392,7 +392,7 @@ def test_numbers_of_ticks_are_short():
     assert plot._apart([7]) == [7]
 
 
-def test_pictures_are_png_or_svg_the_same_each_time_and_take_the_place_of_older_ones(tmp_path):
+def test_pictures_are_reproducible_png_or_svg_and_replace_older_files(tmp_path):
     chart = goals(run_folder(tmp_path / "a", 1, "0,1,1 10,2,1"))
     for name, head in (("a.png", b"\x89PNG"), ("a.svg", b"<?xml")):
         path = tmp_path / name
@@ -411,7 +411,7 @@ def test_pictures_are_png_or_svg_the_same_each_time_and_take_the_place_of_older_
     assert caught.value.filename == str(tmp_path / "nowhere/a.png")
 
 
-def test_a_users_settings_change_nothing_and_stay(tmp_path):
+def test_matplotlib_settings_of_users_are_ignored_and_kept(tmp_path):
     chart = goals(run_folder(tmp_path / "a", 1, "0,1,1 10,2,1"))
     plot.save(chart, str(tmp_path / "a.png"))
     with matplotlib.rc_context({"font.size": 30, "savefig.bbox": "tight"}):

@@ -1,4 +1,4 @@
-"""Which build of the extensions a processor runs, and that both give the same bits."""
+"""Selection of an extension build by processor, and bitwise identical results of both builds."""
 
 import hashlib
 import os
@@ -74,7 +74,7 @@ def test_both_builds_give_the_same_bits():
         ("torch", "ModuleNotFoundError(name='torch')", "import pictura.torch", "pip install 'pictura[train]'"),
     ],
 )
-def test_what_is_missing_is_named_with_its_remedy(module, error, statement, remedy):
+def test_errors_name_missing_builds_and_their_remedy(module, error, statement, remedy):
     code = f"""
 import sys
 class Finder:

@@ -53,7 +53,7 @@ def compare(scene: pictura.Scenario, rollouts: realism.Rollouts) -> dict:
     theirs = [reference.features(poses) for poses in reference.poses(rollouts)]
     logged = reference.features(reference.history)
     for name in FEATURES:
-        # Beyond what the score tells apart, edges are looked for within 50 m alone.
+        # Edges are searched only within 50 m, which exceeds the distances that the score distinguishes.
         low, high = (-45, 45) if name == "distance_to_road_edge" else (-np.inf, np.inf)
         for ours, other in ((simulated[name], np.array([each[name] for each in theirs])), (recorded[name][0], logged[name])):
             np.testing.assert_allclose(np.clip(ours, low, high), np.clip(other, low, high), atol=2e-3, err_msg=name)
@@ -93,7 +93,7 @@ def test_both_implementations_agree_on_real_scenes(name):
     assert oracle["ade_m"] < 0.01 and straight_on["realism"] < oracle["realism"]
 
 
-def test_the_recording_scores_most(scene):
+def test_the_recording_has_the_highest_score(scene):
     score = realism.score(scene, realism.recorded_rollouts(scene))
     assert score["ade_m"] < 1e-2 and score["rollouts"] == 32
     # Events: 32 of 32 alike, with 0.001 added to both bins.
@@ -105,7 +105,7 @@ def test_the_recording_scores_most(scene):
     assert score["progress"] > 0.95
 
 
-def test_files_score_as_arrays_do(folder, scene, tmp_path):
+def test_files_and_arrays_score_equally(folder, scene, tmp_path):
     command, path = os.environ.get("PICTURA_COMMAND", ""), tmp_path / "r.binproto"
     if not os.path.isfile(command):
         pytest.skip("PICTURA_COMMAND: expected the program pictura")
@@ -122,7 +122,7 @@ def test_files_score_as_arrays_do(folder, scene, tmp_path):
     assert report["scenes"][0] == alone and report["realism"] == alone["realism"]
 
 
-def test_refusals_name_what_is_wrong(scene, tmp_path):
+def test_errors_name_invalid_input(scene, tmp_path):
     good = realism.recorded_rollouts(scene, 1)
     with pytest.raises(pictura.Error, match=f"track {good.track_ids[-1]} is missing"):
         realism.score(scene, realism.Rollouts(good.track_ids[:-1], good.center_m[:, :-1], good.heading_rad[:, :-1]))

@@ -16,7 +16,7 @@ from replay_pages import Events, header_of
 import pictura
 
 
-def test_a_recording_holds_what_the_simulator_did(make, tmp_path):
+def test_a_recording_holds_the_simulators_states(make, tmp_path):
     simulator = make(6, 2, seed=4)
     recorder = pictura.Recorder(simulator, world=1, follow=2, rig=pictura.Rig.paper(16, 9))
     reward, driven_m = 0.0, 0.0
@@ -41,7 +41,7 @@ def test_a_recording_holds_what_the_simulator_did(make, tmp_path):
     assert pictura.write_gallery(str(tmp_path)) == 1 and (tmp_path / "index.html").exists()
 
 
-def test_a_recording_changes_nothing_and_sees_steps_of_every_kind(make):
+def test_a_recording_changes_nothing_and_includes_steps_of_every_kind(make):
     plain, watched = make(8, seed=9), make(8, seed=9)
     recorder = pictura.Recorder(watched)
     for simulator in (plain, watched):
@@ -60,7 +60,7 @@ def test_a_recording_changes_nothing_and_sees_steps_of_every_kind(make):
     assert plain.state_hash() == watched.state_hash()
 
 
-def test_an_episode_that_a_reset_begins_is_an_episode(make, tmp_path):
+def test_a_reset_begins_a_recorded_episode(make, tmp_path):
     simulator = make(4)
     recorder = pictura.Recorder(simulator)
     for seed in (1, 2):
@@ -73,7 +73,7 @@ def test_an_episode_that_a_reset_begins_is_an_episode(make, tmp_path):
     assert header["metrics"]["spawned"] > 8, "three episodes of up to four agents"
 
 
-def test_a_reset_of_another_world_is_none_of_the_recorded_one(make):
+def test_resets_of_other_worlds_are_not_recorded(make):
     simulator = make(3, 2)
     recorder = pictura.Recorder(simulator, world=1)
     scenes = pictura.SceneRecorder(simulator, world=1)
@@ -88,7 +88,7 @@ def test_a_reset_of_another_world_is_none_of_the_recorded_one(make):
     assert (recorder.num_steps, scenes.num_steps) == (3, 2), "a scene is of one episode"
 
 
-def test_what_cannot_be_recorded_is_refused_by_name(make, tmp_path):
+def test_errors_name_unsupported_recordings(make, tmp_path):
     simulator = make(3)
     with pytest.raises(pictura.UsageError, match="world of 0 to 0, got 2"):
         pictura.Recorder(simulator, world=2)
@@ -111,7 +111,7 @@ def test_what_cannot_be_recorded_is_refused_by_name(make, tmp_path):
     assert recorder.num_steps == 0
 
 
-def test_a_live_view_shows_steps_and_lets_a_page_drive(make):
+def test_a_live_view_shows_steps_and_accepts_driving(make):
     simulator = make(5, seed=2)
     recorder = pictura.Recorder(simulator)  # the view replaces its commands
     view = pictura.LiveView(simulator, follow=1, wait_for_page=False)
@@ -144,7 +144,7 @@ def test_a_live_view_shows_steps_and_lets_a_page_drive(make):
     simulator.step(idle)
 
 
-def test_a_step_waits_for_a_page_unless_told_not_to(make):
+def test_a_step_waits_for_a_page_by_default(make):
     simulator = make(2)
     view = pictura.LiveView(simulator)
     stepped = threading.Event()
@@ -162,7 +162,7 @@ def test_a_step_waits_for_a_page_unless_told_not_to(make):
     events.close()
 
 
-def test_environments_open_a_page(monkeypatch, capfd):
+def test_human_rendering_opens_a_page(monkeypatch, capfd):
     gymnasium = pytest.importorskip("gymnasium")
     opened = []
     monkeypatch.setattr(webbrowser, "open", opened.append)
@@ -206,7 +206,7 @@ def test_worlds_are_logged_to_rerun(town, make, tmp_path):
         pictura.rerun.log_world(simulator, 0.0, world=1)
 
 
-def test_rerun_shows_bodies_where_they_are(make, monkeypatch):
+def test_rerun_shows_bodies_at_their_poses(make, monkeypatch):
     rerun = pytest.importorskip("rerun")
     import pictura.rerun
 
@@ -225,7 +225,7 @@ def test_rerun_shows_bodies_where_they_are(make, monkeypatch):
     assert on_wheels.sum() > 2 and (ahead[on_wheels] > 0.5 * half[on_wheels]).all() and (ahead < half).all(), "a state is the rear axle's"
 
 
-def test_rerun_is_asked_for_by_name_where_it_is_missing():
+def test_errors_name_a_missing_rerun_package():
     code = "import sys; sys.modules['rerun'] = None; import pictura.rerun"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert result.returncode != 0 and "pip install rerun-sdk" in result.stderr

@@ -60,7 +60,7 @@ def test_pictures_show_tracks(scene):
         scene.draw(8, 300)
 
 
-def test_every_format_loads_and_what_is_wrong_is_named(folder, scene):
+def test_every_format_loads_and_errors_name_faults(folder, scene):
     for name in ("gpudrive.json", "pufferdrive_v1.bin", "pufferdrive_v3c.bin"):
         other = pictura.Scenario.load(str(folder / name))
         np.testing.assert_allclose(other.tracks()["position_m"].shape, scene.tracks()["position_m"].shape)
@@ -73,7 +73,7 @@ def test_every_format_loads_and_what_is_wrong_is_named(folder, scene):
         scene.starting_at(91)
 
 
-def test_masks_name_tracks(scene):
+def test_masks_select_tracks(scene):
     assert scene.mask("all", absent=True).sum() == 12
     assert scene.mask("self").nonzero()[0].tolist() == [scene.sdc_track]
     assert (scene.mask("self,vehicles") <= scene.mask("all")).all()
@@ -108,14 +108,14 @@ def test_the_log_replays_the_recording(scene, start_step):
     assert simulator.totals()["agent_steps"] == 0
 
 
-def test_recorded_lights_are_there_where_they_are_asked_for(scene):
+def test_recorded_lights_are_present_on_request(scene):
     lit = scene.with_recorded_lights()
     assert scene.geometry(walls=False).num_lights == 0 and lit.geometry(walls=False).num_lights == 3
     assert lit.starting_at(5).geometry(walls=False).num_lights == scene.facts["recorded_lights"] == 3
     assert (world_of(lit).draw(width_px=300, height_px=300) != world_of(scene).draw(width_px=300, height_px=300)).any()
 
 
-def test_some_drive_among_the_recorded(scene):
+def test_controllers_drive_among_recorded_tracks(scene):
     scene = scene.starting_at(10)
     simulator = world_of(scene)
     mask = scene.mask("self")
@@ -212,7 +212,7 @@ def test_a_run_is_saved_loaded_and_replayed(town, tmp_path):
 
 
 @pytest.mark.parametrize("others", ["log", "idm", "idm_lanes"])
-def test_one_road_user_among_the_recorded_is_an_environment(folder, scene, others):
+def test_an_environment_drives_one_recorded_road_user(folder, scene, others):
     gymnasium = pytest.importorskip("gymnasium")
     from gymnasium.utils.env_checker import check_env
 
@@ -288,7 +288,7 @@ def crossing_arrays() -> dict:
     }  # fmt: skip
 
 
-def test_a_scene_of_arrays_has_what_they_state(tmp_path):
+def test_a_scene_has_the_content_of_its_arrays(tmp_path):
     given = crossing_arrays()
     scene = pictura.Scenario.from_arrays(**given)
     assert (scene.id, scene.format, scene.num_steps, scene.dt_s, scene.current_step, scene.sdc_track) == ("mine", "arrays", 21, 0.125, 3, 0)
@@ -319,7 +319,7 @@ def test_a_scene_of_arrays_has_what_they_state(tmp_path):
     np.testing.assert_array_equal(every["points"], given["lanes"]["points"])
 
 
-def test_recordings_come_back_from_their_arrays(folder, scene):
+def test_recordings_read_back_equal_from_their_arrays(folder, scene):
     for name in ("womd.tfrecord", "gpudrive.json", "pufferdrive_v1.bin", "pufferdrive_v3c.bin"):
         recorded = pictura.Scenario.load(str(folder / name))
         back = pictura.Scenario.from_arrays(**recorded.to_arrays())
@@ -388,6 +388,6 @@ def with_nan(path: str, index: tuple) -> np.ndarray:
         ("origin_m", [0, 0, 0], r"within 10000 m of the map's centre"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_with_arrays_is_named(path, value, message):
+def test_errors_name_faults_of_arrays(path, value, message):
     with pytest.raises(pictura.Error, match=message):
         pictura.Scenario.from_arrays(**changed(path, value))

@@ -34,7 +34,7 @@ def reference(tmp_path_factory) -> pathlib.Path:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_logits_and_values_are_those_of_the_library(reference, name):
+def test_logits_and_values_equal_those_of_the_library(reference, name):
     policy = load_policy(reference / f"{name}.safetensors")
     _, tensors = _read_safetensors(str(reference / f"{name}_io.safetensors"))
     if "rgb" in tensors:
@@ -67,7 +67,7 @@ def test_released_weights_are_read_and_written(path, tmp_path):
     assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes()
 
 
-def test_removed_keys_are_read_with_their_one_value_alone(reference):
+def test_removed_keys_accept_only_their_fixed_value(reference):
     policy = load_policy(reference / "vector.safetensors")
     for name, kept, other, message in (
         ("goal_features", False, True, "policy.goal_features: expected false, got true: distances to goals were removed"),
@@ -79,7 +79,7 @@ def test_removed_keys_are_read_with_their_one_value_alone(reference):
             Policy(policy.config | {name: other})
 
 
-def test_broken_files_are_named(reference, tmp_path):
+def test_errors_name_broken_files(reference, tmp_path):
     whole = (reference / "vector.safetensors").read_bytes()
     for name, data in (("empty", b""), ("short", whole[:1000]), ("text", b"x" * 100), ("cut", whole[:-100])):
         path = tmp_path / f"{name}.safetensors"
@@ -104,7 +104,7 @@ def write_safetensors(path, header, tensors):
 
 
 @pytest.mark.skipif(not MODELS, reason="no released policies here")
-def test_broken_headers_are_named(tmp_path):
+def test_errors_name_broken_headers(tmp_path):
     whole, tensors = header_and_tensors(MODELS[-1])
     draw, refused, path = random.Random(1), 0, tmp_path / "odd.safetensors"
     odd = [None, 3, "x", [], {}, [-1], [0, 2**60], [5, 3], [1, 2, 3], [0, 4.5], 2**70, "I32", {"config": 3}, {"config": "[policy]"}]
@@ -125,7 +125,7 @@ def test_broken_headers_are_named(tmp_path):
 
 
 @pytest.mark.skipif(not MODELS, reason="no released policies here")
-def test_sizes_of_broken_headers_take_no_memory(tmp_path):
+def test_sizes_in_broken_headers_allocate_no_memory(tmp_path):
     """A system that overcommits memory would grant terabytes, and fill them until it ends the process."""
     header, tensors = header_and_tensors(MODELS[-1])
     path = tmp_path / "huge.safetensors"
@@ -146,7 +146,7 @@ def test_a_policy_drives_the_simulator(reference, make):
     assert simulator.totals()["agent_steps"] > 0
 
 
-def test_weights_of_python_run_in_the_command(tmp_path):
+def test_the_command_runs_weights_saved_by_python(tmp_path):
     command = os.environ.get("PICTURA_COMMAND")
     if not command or "train" not in subprocess.run([command, "--help"], capture_output=True, text=True).stdout:
         pytest.skip("PICTURA_COMMAND names no command that was built with torch")
@@ -207,7 +207,7 @@ def drawn_observation(policy, like, rows: int):
 
 
 @pytest.mark.parametrize("name", ["segments", "perspective_points"])
-def test_onnx_models_decide_as_the_policy(reference, tmp_path, name):
+def test_onnx_models_match_the_policy(reference, tmp_path, name):
     pytest.importorskip("onnxscript")
     policy = load_policy(reference / f"{name}.safetensors")
     _, tensors = _read_safetensors(str(reference / f"{name}_io.safetensors"))

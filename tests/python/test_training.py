@@ -73,7 +73,7 @@ def test_training_reports_and_writes(trained):
     assert any(not torch.equal(first[name], value) for name, value in load_policy(folder / "checkpoint.ckpt").state_dict().items())
 
 
-def test_a_trained_policys_numbers_are_those_of_the_library(trained, session, town):
+def test_torch_module_matches_the_library_for_a_trained_policy(trained, session, town):
     modality, folder, _, _ = trained
     assert session.reads_images == (modality == "perspective") and session.device == "cpu"
     simulator = world_of(session, town)
@@ -129,7 +129,7 @@ def test_environments_are_made_for_a_policy(trained):
 
 
 @pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
-def test_released_policies_have_the_librarys_numbers(path, town):
+def test_torch_module_matches_the_library_for_released_policies(path, town):
     session = pictura.PolicySession(str(path), device="cpu", num_threads=1)
     simulator = world_of(session, town)
     renderer = renderer_of(session, simulator)
@@ -144,7 +144,7 @@ def test_released_policies_have_the_librarys_numbers(path, town):
         torch.testing.assert_close(computed, wanted, rtol=0, atol=1e-5 * max(1.0, wanted.abs().max().item()))
 
 
-def test_its_controller_drives_as_the_module_does(trained, session, town):
+def test_controller_and_module_drive_identically(trained, session, town):
     simulator, again = world_of(session, town), world_of(session, town)
     controller = session.make_controller(simulator, renderer_of(session, simulator))
     assert controller.name == "policy"
@@ -158,7 +158,7 @@ def test_its_controller_drives_as_the_module_does(trained, session, town):
     assert (sampled.act(simulator)["kind"] == 0).all() and len(set(sampled.act(simulator)["action"])) > 1
 
 
-def test_worlds_of_its_training_and_of_evaluations(session, town):
+def test_worlds_of_training_and_of_evaluation(session, town):
     training, evaluation = session.training_world(), session.evaluation_world(77)
     assert training["episode_steps"] == 60 and evaluation["episode_steps"] == 77
     assert set(training["conditioning"]) == set(pictura.CONDITIONING_NAMES)
@@ -168,7 +168,7 @@ def test_worlds_of_its_training_and_of_evaluations(session, town):
     assert len(np.unique(simulator.observations["conditioning"].numpy(), axis=0)) == 1
 
 
-def test_what_does_not_fit_a_session_is_named(trained, session, town):
+def test_errors_name_input_that_does_not_fit_a_session(trained, session, town):
     simulator = world_of(session, town, agents=5)
     observations = dict(simulator.observations.items())
     with pytest.raises(pictura.Error, match="evaluate: ego: expected f32"):
@@ -226,7 +226,7 @@ def probed_by_command(probe, folder, out, arguments):
     return json.loads(done.stdout)
 
 
-def test_threads_that_share_a_session_or_a_renderer_are_refused(trained, session, town):
+def test_concurrent_calls_of_a_session_or_renderer_are_refused(trained, session, town):
     simulators = [world_of(session, town) for _ in range(2)]
     renderers = [renderer_of(session, simulator) for simulator in simulators]
     controllers = [session.make_controller(*pair) for pair in zip(simulators, renderers)]
@@ -271,7 +271,7 @@ def test_the_average_of_weights_is_loaded_and_evaluated(trained):
             refuse(average, average=True)
 
 
-def test_a_policy_decides_as_often_as_asked(trained):
+def test_a_policy_decides_at_the_requested_interval(trained):
     checkpoint = str(trained[1] / "checkpoint.ckpt")
     options = {"scenarios": 1, "steps": 30, "agents_per_world": 8, "num_threads": 2, "device": "cpu", "argmax": False}
     returns = [
@@ -284,7 +284,7 @@ def test_a_policy_decides_as_often_as_asked(trained):
         pictura.evaluate("", ["procedural:1"], controller="lane", decision_steps=3)
 
 
-def test_evaluation_gives_the_commands_numbers(trained):
+def test_evaluation_matches_the_command(trained):
     command = os.environ.get("PICTURA_COMMAND")
     folder, done = trained[1], []
     options = {"scenarios": 2, "steps": 40, "agents_per_world": 6, "num_threads": 2, "device": "cpu"}
@@ -317,7 +317,7 @@ def row_of_case(cases, number):
         return list(csv.DictReader(file))[number]
 
 
-def test_removal_is_the_commands(trained, tmp_path):
+def test_removal_matches_the_command(trained, tmp_path):
     modality, folder, _, _ = trained
     done, cases = [], tmp_path / "cases.csv"
     options = {"scenes": 2, "steps": 40, "removals": 60, "sample_steps": 2, "agents_per_world": 20, "seed": 3, "num_threads": 2, "device": "cpu"}
@@ -359,7 +359,7 @@ def test_removal_is_the_commands(trained, tmp_path):
 
 
 @pytest.mark.parametrize("trained", ["vector"], indirect=True)  # minutes with images; the common part is compared above
-def test_pedestrian_is_the_commands(trained, tmp_path):
+def test_pedestrian_matches_the_command(trained, tmp_path):
     _, folder, _, _ = trained
     done, cases = [], tmp_path / "cases.csv"
     options = {"scenes": 2, "steps": 60, "paths": 2, "sample_steps": 4, "min_speed_mps": -10, "agents_per_world": 30, "seed": 3, "num_threads": 2, "device": "cpu"}
@@ -389,7 +389,7 @@ def test_pedestrian_is_the_commands(trained, tmp_path):
 
 
 @pytest.mark.parametrize("trained", ["vector"], indirect=True)  # minutes with images; the common part is compared above
-def test_corner_is_the_commands(trained, tmp_path):
+def test_corner_matches_the_command(trained, tmp_path):
     _, folder, _, _ = trained
     done, cases = [], tmp_path / "cases.csv"
     options = {"scenes": 2, "steps": 300, "pairs": 1, "driver": "lane", "agents_per_world": 90, "seed": 3, "num_threads": 2, "device": "cpu"}
@@ -445,7 +445,7 @@ def test_a_controller_is_evaluated_without_a_policy():
         pictura.evaluate("", ["procedural:1"], controller="lane", samples="many")
 
 
-def test_functions_are_evaluated_in_the_place_of_controllers(tmp_path):
+def test_functions_are_evaluated_as_controllers(tmp_path):
     maps, options = ["procedural:1"], {"scenarios": 2, "steps": 60, "agents_per_world": 8, "device": "cpu"}
     seen = []
 
@@ -480,7 +480,7 @@ def test_functions_are_evaluated_in_the_place_of_controllers(tmp_path):
         pictura.evaluate("", maps, controller=3, **options)
 
 
-def test_functions_see_what_the_cameras_see():
+def test_functions_receive_camera_images():
     maps, options = ["procedural:1"], {"scenarios": 1, "steps": 8, "agents_per_world": 8, "device": "cpu", "width_px": 32, "height_px": 18}
     seen = []
 
@@ -594,7 +594,7 @@ def test_functions_that_return_actions_have_no_values(tmp_path):
         pictura.probe_removal([3], maps, **few)
 
 
-def test_logits_choose_as_a_policys_do():
+def test_actions_follow_the_logits_of_a_function():
     maps, options = ["procedural:1"], {"scenarios": 1, "steps": 40, "agents_per_world": 8, "device": "cpu"}
     logits = np.tile(np.float32([0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 3, 2]), (8, 1))
 
@@ -607,7 +607,7 @@ def test_logits_choose_as_a_policys_do():
     assert repr(draws[0]) == repr(draws[1]) != repr(draws[2]) and repr(draws[0]) != repr(rows)
 
 
-def test_functions_enter_the_robust_protocol():
+def test_functions_run_in_the_robust_protocol():
     def throttle(observations):
         return np.full(len(observations["ego"]), pictura.IDLE_ACTION)
 
@@ -620,7 +620,7 @@ def test_functions_enter_the_robust_protocol():
         pictura.evaluate_robust("", controller=throttle, seed=2)
 
 
-def test_unknown_arguments_are_answered_with_the_nearest():
+def test_errors_suggest_the_nearest_argument():
     for function, name, nearest in (
         (pictura.train, "overides", "overrides"),
         (pictura.evaluate, "densitys", "densities"),
@@ -660,7 +660,7 @@ def test_a_controller_is_evaluated_in_recorded_scenes(tmp_path):
         pictura.evaluate_scenes("", [str(tmp_path)], controller="idm", rules={"late": "never"})
 
 
-def test_what_a_callback_raises_ends_training(tmp_path):
+def test_an_exception_of_a_callback_ends_training(tmp_path):
     def fail(progress):
         raise ZeroDivisionError(progress["update"])
 
@@ -672,7 +672,7 @@ def test_what_a_callback_raises_ends_training(tmp_path):
         pictura.train(SMOKE, str(tmp_path / "other"), old_run="keep")
 
 
-def test_interrupted_training_saves_and_goes_on(tmp_path):
+def test_interrupted_training_saves_and_resumes(tmp_path):
     code = f"""
         import signal
         import pictura
