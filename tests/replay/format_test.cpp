@@ -127,7 +127,7 @@ TEST(ReplayFormat, DifferencesOfEachOrderAreReadBackAndSteadyMotionIsShort) {
   EXPECT_LT(bytes.size(), 1010u);
 }
 
-TEST(ReplayFormat, Base64IsTheStandards) {
+TEST(ReplayFormat, Base64FollowsTheStandard) {
   // RFC 4648, section 10.
   const std::vector<std::pair<std::string, std::string>> vectors{{"", ""},
                                                                  {"f", "Zg=="},
@@ -178,7 +178,7 @@ TEST(ReplayFormat, ManySmallGroupsAreReadBack) {
   }
 }
 
-TEST(ReplayFormat, HuesAtAnyBrightnessTakeLittleMoreThanTheirBrightness) {
+TEST(ReplayFormat, ImagesOfOneHueTakeLittleMoreSpaceThanGreyOnes) {
   const std::vector<ReplayCamera> cameras{{"a", 64, 64}};
   const std::vector<ReplayHue> hues = replay_hues();
   std::mt19937 random(4);
@@ -195,7 +195,7 @@ TEST(ReplayFormat, HuesAtAnyBrightnessTakeLittleMoreThanTheirBrightness) {
   EXPECT_LT(packed.size(), 64 * 64 * 1.35);  // for three times as many bytes
 }
 
-TEST(ReplayFormat, AReplayIsReadBackAsItWas) {
+TEST(ReplayFormat, AReplayReadsBackEqual) {
   const ScratchFolder folder;
   const Replay replay = any_replay();
   write_replay(folder / "a.html", replay);
@@ -214,7 +214,7 @@ TEST(ReplayFormat, AReplayIsReadBackAsItWas) {
   EXPECT_TRUE(read_replay(folder / "c.html") == removal);
 }
 
-TEST(ReplayFormat, ImagesThatAreTooManyForAFileAreLeftOutFromTheEnd) {
+TEST(ReplayFormat, ExcessImagesAreLeftOutFromTheEnd) {
   const ScratchFolder folder;
   Replay replay = any_replay();
   replay.images.frames_per_group = 10;
@@ -226,7 +226,7 @@ TEST(ReplayFormat, ImagesThatAreTooManyForAFileAreLeftOutFromTheEnd) {
   EXPECT_EQ(back.num_pictured_frames(), 30);
 }
 
-TEST(ReplayFormat, WhatIsDamagedIsNamed) {
+TEST(ReplayFormat, ErrorsNameDamagedParts) {
   const ScratchFolder folder;
   const std::string path = folder / "a.html";
   write_replay(path, any_replay());
@@ -256,7 +256,7 @@ TEST(ReplayFormat, WhatIsDamagedIsNamed) {
   EXPECT_THAT(message(without("{\"format\"", "{\"format")), HasSubstr("damaged JSON"));
 }
 
-TEST(ReplayFormat, NoHeaderMakesTheReaderFailOtherwiseThanByAnError) {
+TEST(ReplayFormat, MutatedHeadersAreReadOrRefused) {
   const ScratchFolder folder;
   const std::string path = folder / "a.html";
   write_replay(path, any_replay());
@@ -311,7 +311,7 @@ TEST(ReplayFormat, AGalleryListsTheWorstFirst) {
   EXPECT_THAT(message_of([&] { write_gallery(folder.path()); }), HasSubstr("other.html: expected a page of pictura"));
 }
 
-TEST(ReplayFormat, AGalleryTakesNoOtherPagesPlaceAndNamesAHeaderThatLacksAValue) {
+TEST(ReplayFormat, AGalleryReplacesNoOtherPageAndNamesMissingHeaderValues) {
   const ScratchFolder folder;
   write_replay(folder / "a.html", any_replay());
   write_file(folder / "index.html", "<p>mine</p>");
@@ -325,7 +325,7 @@ TEST(ReplayFormat, AGalleryTakesNoOtherPagesPlaceAndNamesAHeaderThatLacksAValue)
   EXPECT_THAT(message_of([&] { write_gallery(folder.path()); }), HasSubstr("a.html: expected a replay's header"));
 }
 
-TEST(ReplayFormat, TextsFromOutsideMayHoldAnything) {
+TEST(ReplayFormat, ForeignTextsAreEscaped) {
   const ScratchFolder folder;
   Replay replay = any_replay();
   replay.origin.map = "{{elements}}</script>";
@@ -339,7 +339,7 @@ TEST(ReplayFormat, TextsFromOutsideMayHoldAnything) {
   EXPECT_EQ(write_gallery(folder.path()), 1);
 }
 
-TEST(ReplayFormat, AFirstGroupOfImagesThatIsTooLargeLeavesNone) {
+TEST(ReplayFormat, AnOversizedFirstGroupOfImagesLeavesNoImages) {
   const ScratchFolder folder;
   Replay replay = any_replay();
   replay.images.groups = {std::string(size_t{8} << 20, 'x'), "y"};

@@ -24,7 +24,7 @@ std::unique_ptr<Simulator> make_town(int agents) {
   return make_simulator("cpu", config, {load_map("procedural:1:blocks=2x2")}, {{0, agents, 0}});
 }
 
-TEST(LiveWorld, TellsWhatARecordingHolds) {
+TEST(LiveWorld, SendsTheContentOfARecording) {
   // Two simulators of one seed: one is recorded whole, the other is sent frame by frame.
   const auto recorded = make_town(8), told = make_town(8);
   const auto controller = make_host_controller("random", *recorded, 1);
@@ -58,7 +58,7 @@ TEST(LiveWorld, TellsWhatARecordingHolds) {
   EXPECT_EQ(begin["header"]["frames"], 1);
 }
 
-TEST(LiveWorld, ForgettingKeepsTheNewestChains) {
+TEST(LiveWorld, DiscardingKeepsTheNewestChains) {
   const auto simulator = make_town(8);
   const auto controller = make_host_controller("lane", *simulator, 1);
   Recorder recorder(*simulator, {});
@@ -82,7 +82,7 @@ TEST(LiveWorld, ForgettingKeepsTheNewestChains) {
   }
 }
 
-TEST(LiveRequest, NamesWhatIsWrong) {
+TEST(LiveRequest, ErrorsNameInvalidFields) {
   const auto complaint = [](std::string_view text) -> std::string {
     try {
       parse_live_request(text, 4);
@@ -127,7 +127,7 @@ TEST(Keyboard, SpeedsUpHoldsTurnsStopsAndReverses) {
   EXPECT_GT(std::remainder(left.heading_rad - let_go.heading_rad, 6.2831853f), 0.005f);
 }
 
-TEST(Keyboard, StandsStillAsLongAsStopIsHeld) {
+TEST(Keyboard, StandsStillWhileStopIsHeld) {
   const auto simulator = make_town(1);
   drive(*simulator, {.stop = true}, 25);
   for (int step = 0; step < 8; ++step) {

@@ -64,7 +64,7 @@ class Served(unittest.TestCase):
 
 
 class Http(Served):
-    def test_only_who_knows_the_address_is_let_in(self):
+    def test_requests_without_the_token_are_refused(self):
         self.serve()
         response, text = self.ask()
         self.assertEqual(response.status, 200)
@@ -98,13 +98,13 @@ class Http(Served):
         self.assertEqual(self.control({"paused": True}, Content_Type="text/plain")[0].status, 415)
         self.assertEqual(self.control({"paused": True}, Origin=own)[0].status, 204)
 
-    def test_it_listens_on_the_loopback_alone(self):
+    def test_it_listens_only_on_the_loopback_interface(self):
         self.serve()
         sockets = pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:]
         listening = [line.split()[1] for line in sockets if line.split()[3] == "0A"]
         self.assertEqual([a for a in listening if int(a.split(":")[1], 16) == self.port], [f"0100007F:{self.port:04X}"])
 
-    def test_wrong_requests_are_named(self):
+    def test_errors_name_wrong_requests(self):
         self.serve()
         for request, message in [
             ("{", "expected JSON"),
@@ -123,7 +123,7 @@ class Http(Served):
                 self.assertEqual((response.status, text), (400, message + "\n"))
         self.assertEqual(self.control({"keys": ["left"] * 3000})[0].status, 413)
 
-    def test_it_pauses_steps_and_begins_with_the_first_page(self):
+    def test_it_starts_with_the_first_page_pauses_and_steps(self):
         self.serve("--cameras")
         events = Events(self.address)
         self.assertEqual(events.type, "text/event-stream")
@@ -147,7 +147,7 @@ class Http(Served):
         events.close()
         late.close()
 
-    def test_keys_drive_one_agent_and_are_let_go(self):
+    def test_keys_drive_one_agent_until_released(self):
         self.serve()
         events = Events(self.address)
         tracks = [track["name"] for track in events.next("begin")["header"]["tracks"]]
@@ -171,7 +171,7 @@ class Http(Served):
         self.assertLess(time.monotonic() - begin, 30)
         events.close()
 
-    def test_a_page_that_does_not_read_holds_nothing_up(self):
+    def test_an_unresponsive_page_does_not_block_others(self):
         self.serve("--cameras")
         slow = socket.socket()
         slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -188,7 +188,7 @@ class Http(Served):
         slow.close()
         quick.close()
 
-    def test_no_more_pages_than_it_has_threads_for(self):
+    def test_the_number_of_pages_is_limited_by_threads(self):
         self.serve()
         pages = [Events(self.address) for _ in range(8)]
         self.assertEqual(self.ask(path=self.path + "events")[0].status, 503)
@@ -196,7 +196,7 @@ class Http(Served):
         for page in pages:
             page.close()
 
-    def test_a_port_that_another_of_ours_has_is_an_error(self):
+    def test_a_port_of_another_pictura_server_is_an_error(self):
         self.serve()
         # The command would wait for its first page: the timeout ends it if it does listen.
         result = subprocess.run([PICTURA, "simulate", *WORLD, "--serve", str(self.port)], capture_output=True, text=True, timeout=60)
@@ -230,7 +230,7 @@ class Limits(Served):
     def head(self, method, name, *fields):
         return "\r\n".join([f"{method} {self.path}{name} HTTP/1.1", f"Host: 127.0.0.1:{self.port}", *fields, "", ""])
 
-    def test_requests_that_cost_more_than_they_may_are_refused(self):
+    def test_requests_beyond_limits_are_refused(self):
         self.serve()
         json_type = "Content-Type: application/json"
         nested = gzip.compress(b"[" * 1000000)
@@ -255,7 +255,7 @@ class Limits(Served):
                 self.assertEqual(self.status(request), status)
         self.assertIsNone(self.process.poll())
 
-    def test_a_request_has_five_seconds_to_come(self):
+    def test_a_request_times_out_after_five_seconds(self):
         self.serve()
         slow = self.raw(self.head("GET", "")[:-2])
         begin = time.monotonic()
@@ -269,7 +269,7 @@ class Limits(Served):
         self.assertGreater(time.monotonic() - begin, 3)
         self.assertLess(time.monotonic() - begin, 10)
 
-    def test_connections_do_not_hold_up_the_end(self):
+    def test_connections_do_not_delay_the_end(self):
         self.serve("--cameras")
         idle = [self.raw("") for _ in range(4)]
         halfway = [self.raw(self.head("POST", "control", "Content-Length: 100")) for _ in range(4)]
@@ -287,7 +287,7 @@ class Limits(Served):
 
 
 class Usage(unittest.TestCase):
-    def test_what_makes_no_sense_is_refused(self):
+    def test_invalid_options_are_refused(self):
         for arguments, message in [
             (["--serve", "99999"], "--serve: expected a port of 1 to 65535, got '99999'"),
             (["--serve-host", "here"], "--serve-host: has no effect without --serve"),
@@ -295,7 +295,7 @@ class Usage(unittest.TestCase):
             result = subprocess.run([PICTURA, "simulate", *WORLD, *arguments], capture_output=True, text=True, timeout=60)
             self.assertEqual((result.returncode, result.stderr), (2, f"error: {message}\n"))
 
-    def test_a_port_that_is_taken_is_an_error(self):
+    def test_a_port_in_use_is_an_error(self):
         with socket.socket() as taken:
             taken.bind(("127.0.0.1", 0))
             taken.listen()
@@ -361,7 +361,7 @@ class Chromium(Served):
         self.assertEqual(self.browser.errors, [])
 
     def drive(self, agent):
-        """Takes an agent, stops it, drives on and gives it back. Returns its actions since it stood, or None if it was
+        """Takes control of an agent, stops it, drives it and releases it. Returns its actions since it stood, or None if it was
         halted."""
         last = "pictura.replay.frames - 1"
         self.browser.run(f"pictura.actions.select({agent})")
@@ -386,7 +386,7 @@ class Chromium(Served):
         self.browser.wait_for("pictura.live.driven === -1 && pictura.live.mine === -1")
         return actions
 
-    def test_images_go_on_after_the_page_fell_behind(self):
+    def test_images_continue_after_the_page_fell_behind(self):
         # As after lost messages: the page restarts with the newest step, then discards its oldest steps.
         self.control({"paused": True})
         self.browser.wait_for("pictura.live.paused")
@@ -405,7 +405,7 @@ class Chromium(Served):
         self.browser.wait_for("pictura.pictured().frame === 6 && pictura.pictured().isKept")
         self.assertEqual(self.browser.errors, [])
 
-    def test_a_halt_is_told_by_the_worlds_clock(self):
+    def test_a_halt_shows_its_world_time(self):
         # A page that connected after the world's start.
         self.browser.wait_for("pictura.replay.frames > 5")
         self.control({"paused": True})
@@ -428,7 +428,7 @@ class Chromium(Served):
         self.control({"paused": True})
         return pages
 
-    def test_the_ninth_page_says_that_it_has_no_place(self):
+    def test_the_ninth_page_shows_that_the_limit_is_reached(self):
         self.browser.call("Page.navigate", url="about:blank")
         pages = self.fill_up()
         self.browser.open_address(self.address)
@@ -445,7 +445,7 @@ class Chromium(Served):
             self.browser.open_address(self.address)
             self.browser.wait_for("window.pictura")
 
-    def test_a_begin_that_cannot_be_read_says_so(self):
+    def test_an_unreadable_begin_message_is_reported(self):
         self.browser.call("Page.addScriptToEvaluateOnNewDocument", source="""window.EventSource = class extends EventTarget {
             constructor() { super(); setTimeout(() => this.dispatchEvent(new MessageEvent('begin', { data: '{' })), 50); }
             close() { window.isClosed = true; }
@@ -455,7 +455,7 @@ class Chromium(Served):
         self.assertIn("This page cannot show the simulation: a part of it", self.browser.run("document.getElementById('message').innerText"))
         self.assertTrue(self.browser.run("window.isClosed && document.getElementById('app').hidden"))
 
-    def test_it_says_that_the_simulation_has_ended(self):
+    def test_the_page_shows_the_end_of_the_simulation(self):
         self.stop()
         self.browser.wait_for("document.getElementById('live-state').textContent === 'the simulation has ended'")
         self.browser.key("Home")

@@ -68,7 +68,7 @@ class Mcap(unittest.TestCase):
         self.assertEqual(schemas, {"/map": "foxglove.SceneUpdate", "/agents": "foxglove.SceneUpdate", "/lights": "foxglove.SceneUpdate",
                                    "/events": "foxglove.Log", "/agent": "pictura.Agent", **cameras})  # fmt: skip
 
-    def test_messages_have_what_their_schemas_declare(self):
+    def test_messages_match_their_schemas(self):
         # A scene contains only what it draws, and random actions have no probabilities.
         parts = {".entities." + name for name in ("cubes", "spheres", "lines", "texts")}
         absent = {"/map": parts - {".entities.lines"}, "/agents": parts - {".entities.cubes", ".entities.texts"}, "/lights": parts - {".entities.spheres"},
@@ -79,7 +79,7 @@ class Mcap(unittest.TestCase):
                 self.assertEqual(differences(message, schema), wanted, topic)
         self.assertEqual(set(self.messages["/agent"][0][2]), {"agent", *self.page.tracks})
 
-    def test_what_schemas_and_messages_differ_in_is_found(self):
+    def test_differences_between_schemas_and_messages_are_found(self):
         point = {"type": "object", "properties": {"x": {"type": "number"}}}
         schema = {"type": "object", "properties": {"points": {"type": "array", "items": point}, "name": {"type": "string"}}}
         for message, wanted in [
@@ -90,7 +90,7 @@ class Mcap(unittest.TestCase):
         ]:
             self.assertEqual(differences(message, schema), wanted)
 
-    def test_agents_are_where_the_page_has_them(self):
+    def test_agents_have_the_poses_of_the_page(self):
         tracks = self.page.tracks
         for frame, (_, time_ns, scene) in enumerate(self.messages["/agents"]):
             self.assertEqual(time_ns, frame * 100_000_000)
@@ -131,7 +131,7 @@ class Mcap(unittest.TestCase):
             self.assertAlmostEqual(float(x), self.page.tracks["x_m"][int(agent)][frame] + origin[0], 1)
             self.assertAlmostEqual(float(y), self.page.tracks["y_m"][int(agent)][frame] + origin[1], 1)
 
-    def test_the_summary_is_that_of_the_messages(self):
+    def test_the_summary_matches_the_messages(self):
         with open(self.path, "rb") as file:
             reader = SeekingReader(file)
             summary = reader.get_summary()

@@ -155,7 +155,7 @@ class Chromium(PageCase):
                 a = x[agent["agent"]]
                 self.assertAlmostEqual(agent["x_m"], (a[20] + a[21]) / 2, 6)
 
-    def test_an_agent_is_painted_where_it_stands(self):
+    def test_agents_are_drawn_at_their_positions(self):
         self.open()
         self.browser.run("pictura.actions.seek(60); pictura.actions.select(23); pictura.state.zoom = 8; void 0")
         agent = next(a for a in range(23) if round(self.recorded.tracks["status"][a][60]) == 0)
@@ -201,13 +201,13 @@ class Chromium(PageCase):
         self.browser.wait_for("pictura.state.agent === 17")
         self.assertEqual(self.browser.errors, [])
 
-    def test_the_camera_key_goes_through_the_cameras_of_any_agent(self):
+    def test_the_camera_key_cycles_through_cameras_of_any_agent(self):
         self.open(fragment="#step=5&agent=7")
         for camera in [*(camera["name"] for camera in self.recorded.header["cameras"]), ""]:
             self.browser.key("c")
             self.assertEqual((self.state()["agent"], self.state()["camera"]), (7, camera))
 
-    def test_who_halts_is_not_said_to_brake(self):
+    def test_halted_agents_do_not_brake(self):
         tracks = self.recorded.tracks
         halts = [(f, a) for a in range(24) for f in range(1, 91) if round(tracks["status"][a][f]) == 1 and round(tracks["status"][a][f - 1]) == 0]
         frame, agent = max(halts, key=lambda halt: abs(tracks["speed_mps"][halt[1]][halt[0] - 1]))
@@ -253,7 +253,7 @@ class Chromium(PageCase):
             self.assertRegex(now, r"^\u2212?\d+(\.\d+)?$", term)
             self.assertAlmostEqual(float(now.replace("\u2212", "-")), value, delta=max(0.0051, 0.01 * abs(value)) if abs(value) >= 1 else 0.006 * abs(value) + 1e-9)
 
-    def test_a_recorded_track_shows_what_it_has(self):
+    def test_a_recorded_track_hides_actions_and_rewards(self):
         # An agent with the status of tracks in recordings, which only move.
         self.open(fragment="#step=20&agent=4")
         self.browser.run("pictura.replay.tracks.status.fill(4); pictura.actions.seek(21); pictura.drawn() && null")
@@ -315,7 +315,7 @@ class Chromium(PageCase):
         self.open()
         self.assertTrue(self.browser.run("document.getElementById('case').hidden"))
 
-    def test_the_address_holds_the_view(self):
+    def test_the_address_stores_the_view(self):
         self.open(fragment="#step=42&agent=7&speed=4&zoom=6&follow=1")
         state = self.state()
         self.assertEqual([state[k] for k in ("time", "agent", "speed", "zoom", "follow")], [42, 7, 4, 6, True])
@@ -326,7 +326,7 @@ class Chromium(PageCase):
         self.browser.run("location.hash = '#step=5&agent=2'")
         self.browser.wait_for("pictura.state.time === 5 && pictura.state.agent === 2")
 
-    def test_the_followed_agents_images_are_those_of_the_file(self):
+    def test_images_of_the_followed_agent_equal_those_of_the_file(self):
         self.open(fragment="#step=50&agent=4")
         self.browser.wait_for("pictura.pictured().frame === 50 && pictura.pictured().isKept")
         kept = self.browser.run("pictura.replay.images.frame(50).then(bytes => [...bytes])")
@@ -346,7 +346,7 @@ class Chromium(PageCase):
     def drawn_pictures(self, agent, frame, change="{}"):
         return self.browser.run(f"[...pictura.drawnImages({agent}, {frame}, {change})]")
 
-    def test_images_drawn_in_the_page_are_those_of_the_renderer_but_for_sampling(self):
+    def test_images_drawn_in_the_page_match_the_renderer_within_sampling_error(self):
         self.open()
         squares = count = 0
         for frame in range(0, 91, 10):
@@ -360,7 +360,7 @@ class Chromium(PageCase):
         self.assertGreater(psnr_db, 40)
         self.assertEqual(self.browser.errors, [])
 
-    def test_the_page_draws_what_the_file_holds_no_images_of(self):
+    def test_the_page_draws_images_missing_from_the_file(self):
         # Images of an agent that was not followed, and of the followed agent after the last kept image.
         self.open(fragment="#step=50&agent=7")
         self.browser.wait_for("pictura.pictured().agent === 7")
@@ -375,7 +375,7 @@ class Chromium(PageCase):
         self.browser.wait_for("pictura.pictured().frame === 75 && !pictura.pictured().isKept")
         self.assertTrue(self.shown_pictures() == self.drawn_pictures(4, 75))
 
-    def test_without_webgl_the_page_says_that_it_cannot_draw(self):
+    def test_the_page_reports_missing_webgl(self):
         self.open(fragment="#step=50&agent=4")
         self.browser.run("HTMLCanvasElement.prototype.getContext = (of => function (kind, ...more) { return kind === 'webgl2' ? null : of.call(this, kind, ...more); })(HTMLCanvasElement.prototype.getContext)")
         self.browser.run("pictura.actions.select(7)")
@@ -384,7 +384,7 @@ class Chromium(PageCase):
         self.browser.wait_for("document.getElementById('pictures-note').textContent === 'as recorded'")
         self.assertEqual(self.browser.errors, [])
 
-    def test_what_is_damaged_says_so(self):
+    def test_damaged_data_is_reported(self):
         page = self.path.read_text()
         data = page.index('id="replay-data">') + 17
         images = page.index('id="replay-images">') + 19
@@ -410,7 +410,7 @@ class Chromium(PageCase):
         self.assertTrue(self.browser.run("document.getElementById('app').hidden"))
         self.assertFalse(self.browser.run("document.getElementById('message').hidden"))
 
-    def test_a_header_that_was_changed_says_so(self):
+    def test_a_damaged_header_is_reported(self):
         page = self.path.read_text()
         at = page.index('id="replay-header">')
 
@@ -439,14 +439,14 @@ class Chromium(PageCase):
             with self.subTest(name):
                 self.assert_damaged(changed(f'"{name}":', f'"other_{name}":'), f"its header: metrics.{name}: expected")
 
-    def test_what_cannot_be_shown_says_so(self):
+    def test_undisplayable_data_is_reported(self):
         # Header with all required members, but with tracks that no view knows.
         page = self.path.read_text()
         at = page.index('id="replay-header">')
         self.assert_damaged(page[:at] + page[at:].replace('"name":"steer_deg"', '"name":"steering"'), "This replay is damaged: a part of it cannot be shown")
         self.assertTrue(self.browser.errors)
 
-    def test_the_gallery_filters_and_leads_to_replays(self):
+    def test_the_gallery_filters_and_links_to_replays(self):
         folder = self.folder / "gallery"
         self.pictura("replay", "procedural:1:blocks=2x2", "--agents", 8, "--steps", 40, "--policy", "random", "--gallery", folder, "--episodes", 3)
         self.pictura("replay", "procedural:1:blocks=2x2", "--agents", 2, "--steps", 3, "--policy", "idle", "--out", folder / "still.html")

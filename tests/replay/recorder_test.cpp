@@ -57,7 +57,7 @@ Replay record(Simulator& simulator, const std::string& policy, int steps, const 
   return recorder.finish({.policy = policy});
 }
 
-TEST(Recorder, EachLifeIsAnAgent) {
+TEST(Recorder, RecordsEachLifeAsAnAgent) {
   SimulatorConfig config;
   config.num_threads = 1;
   config.parked_cars = 0;
@@ -117,7 +117,7 @@ TEST(Recorder, SceneryIsTheMapsGeometryToACentimetre) {
   EXPECT_TRUE(near(scenery.heads[0].position_cm, geometry.heads[0].position_m));
 }
 
-TEST(Recorder, TheOriginSaysHowLightsCycle) {
+TEST(Recorder, TheOriginHoldsTheLightCycles) {
   const auto recorded = [](const SimulatorConfig& config, const std::string& map) {
     const auto simulator = make_simulator("cpu", config, {load_map(map)}, {{0, 2, 0}});
     return record(*simulator, "idle", 1, {}, [](auto&&...) {}).origin.light_cycles;
@@ -126,7 +126,7 @@ TEST(Recorder, TheOriginSaysHowLightsCycle) {
   EXPECT_EQ(recorded({.light_cycles = LightCycles::independent}, "procedural:1:blocks=2x2"), "independent");
 }
 
-TEST(Recorder, PlacesAreWithinHalfAUnitOfTheSimulators) {
+TEST(Recorder, PositionsAreWithinHalfAUnitOfTheSimulators) {
   for (const char* policy : {"random", "lane"}) {
     const std::unique_ptr<Simulator> simulator = town(kAgents);
     std::vector<std::vector<AgentBox>> boxes;
@@ -211,7 +211,7 @@ TEST(Recorder, RewardTermsAddUpToTheSimulatorsRewardAndMetricsToItsTotals) {
   }
 }
 
-TEST(Recorder, StepsBelongToTheFrameThatTheyLeadTo) {
+TEST(Recorder, StepsBelongToTheirResultingFrame) {
   const std::unique_ptr<Simulator> simulator = town(kAgents);
   std::vector<std::vector<int32_t>> actions, events;
   const Replay replay = record(*simulator, "random", 120, {.world = kWorld, .followed = 2},
@@ -253,7 +253,7 @@ TEST(Recorder, StepsBelongToTheFrameThatTheyLeadTo) {
   }
 }
 
-TEST(Recorder, ImagesAreTheOraclesBytes) {
+TEST(Recorder, ImagesEqualTheOraclesBytes) {
   const std::unique_ptr<Simulator> simulator = town(kAgents);
   const RendererConfig config{.rig = paper_rig(32, 18)};
   const std::unique_ptr<Renderer> renderer = make_renderer("cpu", config);
@@ -281,7 +281,7 @@ TEST(Recorder, ImagesAreTheOraclesBytes) {
   EXPECT_GT(std::count_if(all.begin(), all.end(), [](char c) { return c != 0; }), 10000);
 }
 
-TEST(Recorder, WhatCannotBeRecordedIsRefused) {
+TEST(Recorder, RefusesUnsupportedOptions) {
   const std::unique_ptr<Simulator> simulator = town(kAgents);
   EXPECT_THAT(message_of([&] { Recorder(*simulator, {.world = 2}); }), HasSubstr("expected a world of 0 to 1, got 2"));
   EXPECT_THAT(message_of([&] { Recorder(*simulator, {.world = 1, .followed = kAgents}); }),

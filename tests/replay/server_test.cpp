@@ -88,7 +88,7 @@ Told listen(const std::string& address) {
   return told;
 }
 
-TEST(LiveServer, TellsItsPagesAllInOrderWhileOthersComeAskAndGo) {
+TEST(LiveServer, SendsAllEventsInOrderAmidOtherConnections) {
   auto server = std::make_unique<LiveServer>(LiveServerOptions{.num_agents = kServedAgents});
   const std::string address = server->address();
 
@@ -139,7 +139,7 @@ TEST(LiveServer, TellsItsPagesAllInOrderWhileOthersComeAskAndGo) {
   for (int i = 0; i < kRequests; ++i) EXPECT_EQ(watched[i], i % kServedAgents);
 }
 
-TEST(LiveServer, EndsAtOnceWhateverItsConnectionsDo) {
+TEST(LiveServer, EndsAtOnceForAnyConnectionState) {
   auto server = std::make_unique<LiveServer>(LiveServerOptions{.num_agents = 1});
   std::vector<std::unique_ptr<Connection>> connections;
   const auto connect = [&](const std::string& text) {
@@ -156,7 +156,7 @@ TEST(LiveServer, EndsAtOnceWhateverItsConnectionsDo) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(1));
 }
 
-TEST(LiveServer, HasItsPortForItselfAndRefusesNamesThatNoBrowserSends) {
+TEST(LiveServer, RefusesAPortInUseAndInvalidHostNames) {
   const LiveServer first(LiveServerOptions{.num_agents = 1});
   const std::string address = first.address();
   const int port = std::stoi(address.substr(address.rfind(':') + 1));
