@@ -88,7 +88,7 @@ TEST(Collision, SweptAt20MetresPerSecondAcrossAThinBox) {
   EXPECT_TRUE(collide(thin, thin, from, to));
 }
 
-TEST(Collision, LevelsDoNotMeet) {
+TEST(Collision, BoxesOnDifferentLevelsDoNotCollide) {
   AgentBox below = make_box(0, 0), above = make_box(1, 0);
   above.center_m.z = 5;
   EXPECT_FALSE(collide(below, below, above, above));
@@ -127,7 +127,7 @@ TEST(Collision, FaultIsJudgedByTheRearPlaneBeforeTheStep) {
       make_box(7 - 2.9f * cos_of(2) - 1.2f * sin_of(2), 3 - 2.9f * sin_of(2) + 1.2f * cos_of(2), 2, 1.7f, 0.6f)));
 }
 
-TEST(Collision, ARearEndAtSpeedIsTheRammersFaultAlone) {
+TEST(Collision, OnlyTheRammerIsAtFaultForARearEndCollisionAtSpeed) {
   // Bumpers 0.1 m apart, 1.5 m aside: the rammer ends 1.4 m inside the other box. The other's centre is then beside
   // the rammer's bumper rather than behind it.
   testing::Stage stage(testing::stadium(200, 2), 2);
@@ -138,7 +138,7 @@ TEST(Collision, ARearEndAtSpeedIsTheRammersFaultAlone) {
   EXPECT_EQ(stage.events(1), kEventCollision);
 }
 
-TEST(Collision, ACyclistAtTheRearCornerIsAtFaultAlone) {
+TEST(Collision, OnlyACyclistAtTheRearCornerIsAtFault) {
   testing::Stage stage(testing::stadium(200, 2), 2);
   stage.worlds.state.agents.length_m[0] = 1.7f;
   stage.worlds.state.agents.width_m[0] = 0.6f;
@@ -162,7 +162,7 @@ struct At20MetresPerSecond : ::testing::Test {
   }
 };
 
-TEST_F(At20MetresPerSecond, NothingIsPassedUnnoticed) {
+TEST_F(At20MetresPerSecond, AllCrossingsAreDetected) {
   auto map = testing::stadium(200, 1);
   testing::Stage free_road(map, 1), walker(map, 2);
   walker.worlds.state.agents.length_m[1] = walker.worlds.state.agents.width_m[1] = 0.4f;

@@ -31,7 +31,7 @@ class Letter final : public StepObserver {
   std::string& text_;
 };
 
-TEST(DriveSteps, ActsStepsAndReportsUntilAnActEndsIt) {
+TEST(DriveSteps, ActsStepsAndReportsUntilAnActReturnsFalse) {
   const auto simulator = town();
   std::vector<Command> commands(3);
   std::string text;
@@ -52,7 +52,7 @@ TEST(DriveSteps, ActsStepsAndReportsUntilAnActEndsIt) {
   EXPECT_EQ(simulator->totals().slot_steps, 6);
 }
 
-TEST(DriveSteps, AControllerDrivesAllAgentsAsStepByStep) {
+TEST(DriveSteps, DrivingWithAControllerEqualsSingleSteps) {
   const auto simulator = town(), same = town();
   const auto controller = make_controller("random", *simulator, 7),
              same_controller = make_controller("random", *same, 7);

@@ -35,7 +35,7 @@ TEST(Goal, WaypointsLie20To60MetresApartAlongTheRoute) {
   EXPECT_GT(longest, 58);
 }
 
-TEST(Goal, LanesChangeWithAQuarterOfTheWaypoints) {
+TEST(Goal, AQuarterOfTheWaypointsChangesLanes) {
   const MapRules map = make_map_rules(*testing::stadium(200, 2), {});
   RandomStream random({.seed = 3, .purpose = Purpose::goals});
   RoutePoint at{0, 10};
@@ -50,8 +50,8 @@ TEST(Goal, LanesChangeWithAQuarterOfTheWaypoints) {
   EXPECT_NEAR(changes / double{kWaypoints}, 0.125, 0.02);
 }
 
-TEST(Goal, RoutesLeaveALaneThatEndsForTheNearestThatGoesOn) {
-  // Only the innermost of the southern straight's three lanes goes on.
+TEST(Goal, RoutesLeaveAnEndingLaneForTheNearestContinuingLane) {
+  // Only the innermost of the southern straight's three lanes continues.
   auto map = testing::stadium(200, 3);
   for (const size_t lane : {0u, 4u}) map->lanes[lane].successors = {};
   const MapRules rules = make_map_rules(*map, {});
@@ -81,7 +81,7 @@ TEST(Goal, RoutesAvoidDeadEnds) {
   }
 }
 
-TEST(Goal, PassesByThePathOnItsLevel) {
+TEST(Goal, PassingFollowsThePathOnItsLevel) {
   EXPECT_TRUE(passes({0, 0, 0}, {4, 0, 0}, {2, 1.9f, 0}, 2));
   EXPECT_FALSE(passes({0, 0, 0}, {4, 0, 0}, {2, 2.1f, 0}, 2));
   EXPECT_FALSE(passes({0, 0, 0}, {4, 0, 0}, {6.1f, 0, 0}, 2));
@@ -137,7 +137,7 @@ TEST_F(GoalChain, AdvancesAndRenews) {
   EXPECT_NEAR(stage.worlds.state.agents.waypoint_y_m[0], 0, 1e-4);
 }
 
-TEST_F(GoalChain, TheLastWaypointPaysOnlyBelowItsSpeedButAdvances) {
+TEST_F(GoalChain, TheLastWaypointIsRewardedOnlyBelowItsSpeedButAdvances) {
   stage.set(0, Conditioning::v_goal_mps, 5);
   drive_until(kEventWaypoint);
   drive_until(kEventWaypoint);
@@ -146,7 +146,7 @@ TEST_F(GoalChain, TheLastWaypointPaysOnlyBelowItsSpeedButAdvances) {
   EXPECT_EQ(stage.worlds.state.agents.goals_reached[0], 1);
 }
 
-TEST_F(GoalChain, AWideRadiusDoesNotHideTheGoalFromTheMetric) {
+TEST_F(GoalChain, TheMetricCountsArrivalForAWideRewardRadius) {
   stage.set(0, Conditioning::delta_goal_m, 12);
   drive_until(kEventWaypoint);
   drive_until(kEventWaypoint);
@@ -157,7 +157,7 @@ TEST_F(GoalChain, AWideRadiusDoesNotHideTheGoalFromTheMetric) {
   EXPECT_EQ(stage.worlds.state.agents.goal_open[0], 0);
 }
 
-TEST_F(GoalChain, TheMetricCountsAChainOnce) {
+TEST_F(GoalChain, TheMetricCountsEachChainOnce) {
   stage.set(0, Conditioning::delta_goal_m, 0.5f);
   drive_until(kEventWaypoint);
   drive_until(kEventWaypoint);

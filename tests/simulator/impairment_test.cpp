@@ -68,7 +68,7 @@ TEST(Impairment, IsDrawnPerAgentAndEpisodeByItsShares) {
   EXPECT_NEAR(changed / double{kAgents}, 1 - (0.05 * 0.05 + 0.1 * 0.1 + 0.2 * 0.2 + 0.65 * 0.65), 2 * kTolerance);
 }
 
-TEST(Impairment, ShowsInOneSpellOfSecondsInEveryTen) {
+TEST(Impairment, IsActiveOnceInEveryTenSeconds) {
   for (const float dt_s : {0.1f, 0.05f}) {
     const int period_steps = static_cast<int>(10 / dt_s + 0.5f);
     int shown = 0, begun_at_once = 0;
@@ -95,7 +95,7 @@ TEST(Impairment, ShowsInOneSpellOfSecondsInEveryTen) {
   EXPECT_FALSE(is_active_at(Impairment::none, 1234, 0.1f, 3, 1, 2, 0));
 }
 
-TEST(Impairment, HidesRoadUsersOrLightsFromListsAndImagesAndNothingElse) {
+TEST(Impairment, HidesOnlyRoadUsersOrLightsFromListsAndImages) {
   SimulatorConfig config{.pedestrian_fraction = 0.2f, .cyclist_fraction = 0.2f, .parked_cars = 30};
   config.after_infraction = AfterInfraction::drive_on;
   config.reset_inactive_fraction = 2;
@@ -209,7 +209,7 @@ TEST(Impairment, ImpairedAgentsAreNeitherValidNorCounted) {
   EXPECT_GT(halted, 10) << "impaired agents halt as all do, and stay in everybody's way";
 }
 
-TEST(Impairment, GoesOnFromASavedStateAsItWouldAndIsNotMixedUp) {
+TEST(Impairment, ContinuesExactlyFromASavedState) {
   SimulatorConfig config;
   config.episode_steps = 70;
   config.others = kMixed;
@@ -227,7 +227,7 @@ TEST(Impairment, GoesOnFromASavedStateAsItWouldAndIsNotMixedUp) {
   EXPECT_THAT(test::message_of([&] { other->restore(simulator->save()); }), HasSubstr("others"));
 }
 
-TEST(Impairment, SharesLeaveAgentsToLearn) {
+TEST(Impairment, SharesSumToLessThanOne) {
   const auto message = [](const OtherShares& shares) {
     SimulatorConfig config = testing::cars();
     config.others = shares;

@@ -135,7 +135,7 @@ INSTANTIATE_TEST_SUITE_P(Towns, LightHeadsOf,
                                            "Town05#1", "Town07#4", "procedural:3#3", "city:1", "city:2", "city:3#1"),
                          test::map_name);
 
-TEST_P(LightHeadsOf, AreSeenFromTheirLineIfTheyAreToBeVisible) {
+TEST_P(LightHeadsOf, VisibleHeadsAreInViewFromTheirStopLine) {
   const Shares mapped = shares_of(*map_, mapped_, {}), visible = shares_of(*map_, visible_, {}),
                past_walls = shares_of(*map_, visible_, visible_.walls);
   fmt::print(

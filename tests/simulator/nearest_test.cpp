@@ -12,7 +12,7 @@
 namespace pictura {
 namespace {
 
-TEST(NearestOfOneThread, IsTheBeginningOfTheSortedOnesWhateverTheirNumber) {
+TEST(NearestOfOneThread, EqualsTheStartOfTheSortedItems) {
   RandomStream random({.seed = 3, .purpose = Purpose::town});
   constexpr int kCapacity = 10;
   for (int num_items = 0; num_items < 150; ++num_items) {

@@ -67,7 +67,7 @@ Span<const float> partner(const ObservationView& observation, int row) {
   return observation.partners.subspan(static_cast<size_t>(row) * kPartnerFeatures, kPartnerFeatures);
 }
 
-TEST(ObservationQueries, WithoutChangesAreTheBitsOfTheObservations) {
+TEST(ObservationQueries, EqualTheObservationsWithoutChanges) {
   for (const bool auxiliary : {true, false}) {
     for (const bool walls : {true, false}) {
       for (const bool sets : {true, false}) {
@@ -97,7 +97,7 @@ TEST(ObservationQueries, WithoutChangesAreTheBitsOfTheObservations) {
   }
 }
 
-TEST(ObservationQueries, HidingIsTheObservationOfAWorldWithoutThatAgent) {
+TEST(ObservationQueries, HidingAnAgentEqualsAWorldWithoutIt) {
   int changed = 0, unchanged = 0;
   for (const int32_t gone : {1, 9, 20}) {
     const auto simulator = queue_of(24, 3.5f), without = queue_of(24, 3.5f);
@@ -123,7 +123,7 @@ TEST(ObservationQueries, HidingIsTheObservationOfAWorldWithoutThatAgent) {
   EXPECT_GT(unchanged, 20) << "who has sixteen nearer ones";
 }
 
-TEST(ObservationQueries, TheSeventeenthComesInUnlessThereIsAGap) {
+TEST(ObservationQueries, ANextPartnerReplacesAHiddenOneUnlessGapsAreKept) {
   const auto simulator = queue_of(20, 4);
   const ObservationView before = observation_of(simulator->observations(), 0);
   // Partners of slot 0 are 1 to 16; the third is hidden.
@@ -161,7 +161,7 @@ TEST(ObservationQueries, HidingAgentsOutOfRangeOrTheAgentItselfChangesNothing) {
   }
 }
 
-TEST(ObservationQueries, ABoxInsertedInThePlaceOfAHiddenOneIsThatOne) {
+TEST(ObservationQueries, ABoxInsertedAtAHiddenAgentEqualsThatAgent) {
   for (const bool auxiliary : {true, false}) {
     SimulatorConfig config = testing::cars();
     config.auxiliary_observations = auxiliary;
@@ -290,7 +290,7 @@ TEST(ObservationQueries, ShowTheNearestOfAnyHiddenAndInserted) {
   EXPECT_GT(full, 100);
 }
 
-TEST(ObservationQueries, LeaveTheSimulatorAsItWas) {
+TEST(ObservationQueries, DoNotChangeTheSimulator) {
   const auto simulator = busy({.wall_observations = true});
   const std::vector<int32_t> actions = testing::mixed_actions(simulator->num_slots(), 99);
   const StepResult result = simulator->step(actions);
@@ -309,7 +309,7 @@ TEST(ObservationQueries, LeaveTheSimulatorAsItWas) {
   EXPECT_TRUE(testing::same_bits(simulator->views(), Span<const View>(views)));
 }
 
-TEST(ObservationQueries, AreRefusedByNameAndNothingIsWritten) {
+TEST(ObservationQueries, ErrorsNameInvalidQueriesAndWriteNothing) {
   const auto simulator = make_simulator("cpu", testing::cars(), {testing::stadium(200, 2)}, {{0, 4, 0}, {0, 3, 1}});
   AnswerMemory answers(2, simulator->config()), untouched(2, simulator->config());
   const std::vector<int32_t> hidden{1, 5};
@@ -346,7 +346,7 @@ TEST(ObservationQueries, AreRefusedByNameAndNothingIsWritten) {
             "observe: query 1: inserted: expected finite numbers, got non-finite numbers in box 1 of the list");
 }
 
-TEST(ObservationQueries, AreAnsweredOnlyInArraysThatFit) {
+TEST(ObservationQueries, RefuseAnswerArraysOfOtherSizes) {
   const auto simulator = make_simulator("cpu", testing::cars(), {testing::stadium(200, 2)}, {{0, 4, 0}});
   const std::vector<ObservationQuery> queries(2);
   AnswerMemory answers(2, simulator->config());

@@ -162,7 +162,7 @@ SimulatorConfig mixed_traffic() {
 
 class ObservationOfMap : public ::testing::TestWithParam<const char*> {};
 
-TEST_P(ObservationOfMap, IsTheReference) {
+TEST_P(ObservationOfMap, MatchesTheReference) {
   if (const std::string reason = test::missing(GetParam()); !reason.empty()) GTEST_SKIP() << reason;
   const auto simulator = make(mixed_traffic(), load_map(GetParam()), {{0, 24, 0}});
   Compared compared;
@@ -178,7 +178,7 @@ INSTANTIATE_TEST_SUITE_P(Maps, ObservationOfMap,
                                            "Town10HD", "Town03#2", "procedural:1", "procedural:2", "procedural:3"),
                          test::map_name);
 
-TEST(ObservationReference, HoldsWhateverIsConfigured) {
+TEST(ObservationReference, HoldsForEveryConfiguration) {
   const auto town = load_map("procedural:2:blocks=2x2");
   const auto compare_with = [&town](const auto& change) {
     SimulatorConfig config = mixed_traffic();
@@ -215,7 +215,7 @@ TEST(ObservationReference, HoldsInCrowds) {
   EXPECT_EQ(compared.full[static_cast<size_t>(EntitySet::partners)], compared.observations);
 }
 
-TEST(ObservationReference, AnAgentThatLeavesAtItsGoalObservesNothing) {
+TEST(ObservationReference, ALeavingAgentObservesNothing) {
   SimulatorConfig config = mixed_traffic();
   config.leave_at_goal = true;
   const auto simulator = make(config, load_map("procedural:2:blocks=2x2"), {{0, 12, 0}});
@@ -241,7 +241,7 @@ TEST(ObservationReference, AnAgentThatLeavesAtItsGoalObservesNothing) {
   EXPECT_EQ(compared.zeros, 6);
 }
 
-TEST(ObservationReference, HoldsOnRoadsThatEnd) {
+TEST(ObservationReference, HoldsOnOpenRoads) {
   SimulatorConfig config = cars({.num_threads = 1, .reset_inactive_fraction = 2});
   const auto simulator =
       make(config, std::make_shared<RoadMap>(parse_opendrive(test::open_street(), "street.xodr")), {{0, 12, 0}});

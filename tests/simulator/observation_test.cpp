@@ -68,7 +68,7 @@ TEST_F(Observation, PartnersAreTheNearestInOrder) {
   }
 }
 
-TEST(ObservationOfParkedCars, IsThatOfPartnersAtRest) {
+TEST(ObservationOfParkedCars, EqualsThatOfPartnersAtRest) {
   SimulatorConfig config = testing::cars();
   config.parked_cars = 1;
   testing::Stage parking(testing::stadium(200, 2), 2, config);
@@ -210,7 +210,7 @@ TEST_F(Observation, EveryCoefficientHasThePapersRange) {
 
 /// Expects that listed pieces are exactly the pieces in sight: compared with all pieces of the map, from many places
 /// and headings.
-TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
+TEST_F(Observation, ListsHoldAllLanesBoundariesAndWallsInSight) {
   RandomStream random({.seed = 5, .purpose = Purpose::town});
   const MapRules& map = stage.worlds.setup.maps[0]->rules;
   for (int i = 0; i < 300; ++i) {
@@ -252,7 +252,7 @@ TEST_F(Observation, LanesBoundariesAndWallsAreAllThatIsInSight) {
 }
 
 /// Only places at the cell's edges and headings at the sector's ends see the far corners of the range.
-TEST(ObservedLists, HoldWhateverIsInSight) {
+TEST(ObservedLists, HoldAllPiecesInSight) {
   const auto map = compile_map(load_map("procedural:3"));
   const MapRules& rules = map->rules;
   const MapView view = rules.view();
@@ -343,7 +343,7 @@ TEST_F(Observation, WallsAreTheirPiecesWithTheirHeights) {
   EXPECT_EQ(found, 2);
 }
 
-TEST_F(Observation, WallsAreThereOnlyWhereTheyAreAskedFor) {
+TEST_F(Observation, WallsAreObservedOnlyIfConfigured) {
   const auto map = make_map();
   EXPECT_TRUE(testing::Stage(map, 1).results.observation_view().walls.empty());
   SimulatorConfig config = testing::cars({.walls = false, .wall_observations = true});
@@ -356,7 +356,7 @@ TEST_F(Observation, WallsAreThereOnlyWhereTheyAreAskedFor) {
   EXPECT_TRUE(testing::Stage(map, 1, config).results.observation_view().walls.empty());
 }
 
-TEST_F(Observation, HaltedAndAbsentAgentsObserveNothingButTheyAreSeen) {
+TEST_F(Observation, HaltedAgentsAreObservedButObserveNothing) {
   AgentState& agents = stage.worlds.state.agents;
   agents.status[1] = AgentStatus::halted;
   agents.events[1] = kEventNone;

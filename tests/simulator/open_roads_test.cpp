@@ -44,7 +44,7 @@ void drive(Simulator* simulator, const std::string& controller, int steps, const
   drive(simulator, make_controller(controller, *simulator, 1).get(), steps, look);
 }
 
-TEST(OpenRoads, TheLaneKeeperDrivesOffAndOthersEnter) {
+TEST(OpenRoads, AgentsLeaveUnderLaneKeepingAndOthersEnter) {
   struct Case {
     const char* name;
     std::string text;
@@ -73,7 +73,7 @@ TEST(OpenRoads, TheLaneKeeperDrivesOffAndOthersEnter) {
 
 /// Cars cannot get round the end of this road, which turns by 2.5 rad within 5 cm. Cars that stopped there once crept
 /// over the edge, by millimetres a second.
-TEST(OpenRoads, WhatCannotGoOnStands) {
+TEST(OpenRoads, BlockedCarsStandStill) {
   test::RoadText road;
   road.length = 24.1;
   road.geometry =
@@ -135,7 +135,7 @@ TEST(OpenRoads, LeavingIsTruncatedAndLaterStepsHaveNoAgent) {
 }
 
 /// Rules of entering by positions alone: 2 m + 2 s v behind the next box on the lane, one agent a step and entry.
-TEST(OpenRoads, AgentsEnterInsideWithRoomAhead) {
+TEST(OpenRoads, EnteringAgentsAreInsideTheMapWithRoomAhead) {
   const auto map = map_of(test::open_street());
   const auto simulator = make(testing::cars({.num_threads = 1, .reset_inactive_fraction = 2}), map, {{0, 24, 0}});
   std::vector<int32_t> lives(24, 0);
@@ -235,7 +235,7 @@ TEST(OpenRoads, ExitsOfOtherLevelsHoldNoAgent) {
   EXPECT_GT(stage.world().agents.x_m[0], 55);
 }
 
-TEST(OpenRoads, AgentsStartWithWayAhead) {
+TEST(OpenRoads, AgentsStartWithRoadAhead) {
   const auto simulator = make(testing::cars(), map_of(test::open_street(30)), {{0, 20, 0}});
   const SpawnReport report = simulator->spawn_report();
   EXPECT_GT(report.spawned, 0);

@@ -11,7 +11,7 @@
 namespace pictura {
 namespace {
 
-TEST(PiecesInSight, AreThoseThatAreInSightOneByOne) {
+TEST(PiecesInSight, MatchIndividualVisibilityTests) {
   RandomStream random({.seed = 8, .purpose = Purpose::town});
   std::vector<ObservedPiece> pieces(200);
   std::vector<Vec2> middles;

@@ -201,7 +201,7 @@ std::shared_ptr<const Scenario> crossing_with(RecordedLightState state) {
   return std::make_shared<const Scenario>(std::move(scene));
 }
 
-TEST(RecordedWorlds, RecordedLightsShowWhatWasRecordedWhereTheyAreAskedFor) {
+TEST(RecordedWorlds, RecordedLightsShowTheirRecordedStatesIfConfigured) {
   constexpr int32_t kStart = 7;
   const auto scene = crossing();
   ASSERT_EQ(world_of(scene)->scene().light_states.size(), 0u);
@@ -282,7 +282,7 @@ int32_t mover(const Scenario& scene, size_t last) {
   return -1;
 }
 
-TEST(RecordedWorlds, AnActionTakesOverFromWhatTheRecordImplies) {
+TEST(RecordedWorlds, AnActionStartsFromTheRecordedMotion) {
   const auto scene = crossing(kNobodyInTheWay);
   const int32_t self = mover(*scene, 40);
   ASSERT_GE(self, 0);
@@ -294,7 +294,7 @@ TEST(RecordedWorlds, AnActionTakesOverFromWhatTheRecordImplies) {
     const StepResult result = simulator->step(commands);
     EXPECT_EQ(result.valid[self], 1);
     EXPECT_EQ(status_of(*simulator, self), AgentStatus::active) << int{simulator->state().halt_reason[self]};
-    // The agent goes on straight at the recorded speed.
+    // The agent continues straight at the recorded speed.
     const TrackState& from = scene->states_of(self)[taken_at];
     const float speed_mps = length(from.velocity_mps);
     const AgentBox& box = simulator->scene().agents[self];
@@ -307,7 +307,7 @@ TEST(RecordedWorlds, AnActionTakesOverFromWhatTheRecordImplies) {
   }
 }
 
-TEST(RecordedWorlds, DriversCollideWithTheRecordedAndHalt) {
+TEST(RecordedWorlds, DrivenAgentsCollideWithRecordedTracksAndHalt) {
   const auto scene = crossing();
   const int32_t self = mover(*scene, 40);
   const auto simulator = world_of(scene);
@@ -334,7 +334,7 @@ TEST(RecordedWorlds, DriversCollideWithTheRecordedAndHalt) {
   EXPECT_EQ(simulator->scene().agents[self].center_m.x, before.center_m.x);
 }
 
-TEST(RecordedWorlds, TheGoalIsTheEndOfTheRecordAndPassedOnce) {
+TEST(RecordedWorlds, TheGoalIsTheEndOfTheRecordAndIsPassedOnce) {
   const auto scene = crossing(kNobodyInTheWay);
   const int32_t self = mover(*scene, 40);
   const auto simulator = world_of(scene);
@@ -380,7 +380,7 @@ Command place(const Scenario& scene, int32_t track, const TrackState& at) {
           .speed_mps = length(at.velocity_mps)};
 }
 
-TEST(RecordedWorlds, ArrivedAgentsLeaveAndMeetNoAgent) {
+TEST(RecordedWorlds, ArrivedAgentsLeaveWithoutLaterCollisions) {
   const auto scene = crossing(kNobodyInTheWay);
   const int32_t self = mover(*scene, 40), other = self + 1;
   const auto simulator = world_with(scene, AfterInfraction::halt, /*leave_at_goal=*/true);
@@ -396,7 +396,7 @@ TEST(RecordedWorlds, ArrivedAgentsLeaveAndMeetNoAgent) {
   EXPECT_EQ(simulator->state().goals_reached[self], 1);
   EXPECT_EQ(simulator->scene().agents[slot].drawn, 1) << "all see where it arrived";
   const std::vector<uint8_t> saved = simulator->save();
-  // Another agent comes to the same place without a collision. The world ignores commands to the agent that left.
+  // Another agent reaches the same place without a collision. The world ignores commands to the agent that left.
   commands[other] = place(*scene, other, goal);
   commands[slot] = {};
   result = simulator->step(commands);
@@ -458,7 +458,7 @@ TEST(RecordedWorlds, ObservedPiecesAreCutFromWholeLines) {
   }
 }
 
-TEST(RecordedWorlds, DriversLeaveTheRoadWhereTheEdgesSaySo) {
+TEST(RecordedWorlds, DrivenAgentsLeaveTheRoadAtRoadEdges) {
   const auto scene = crossing();
   const int32_t self = mover(*scene, 40);
   const auto simulator = world_of(scene);
@@ -491,7 +491,7 @@ TEST(RecordedWorlds, AreSavedAndRestored) {
   EXPECT_THAT(test::message_of<Error>([&] { later->restore(a->save()); }), HasSubstr("the saved state differs in"));
 }
 
-TEST(RecordedWorlds, WithTheLargestBoxAreRestored) {
+TEST(RecordedWorlds, WorldsWithTheLargestBoxAreRestored) {
   for (int i = 0; i < 50; ++i) {
     Scenario large = *crossing();
     large.tracks[0].length_m = 15.0f + 0.137f * static_cast<float>(i);
@@ -502,7 +502,7 @@ TEST(RecordedWorlds, WithTheLargestBoxAreRestored) {
   }
 }
 
-TEST(RecordedWorlds, ControllersShareThemByMasks) {
+TEST(RecordedWorlds, MasksDivideTracksAmongControllers) {
   const auto scene = crossing();
   const auto simulator = world_of(scene);
   const auto log = make_controller("log", *simulator, 0), idle = make_controller("idle", *simulator, 0);
@@ -579,7 +579,7 @@ float largest_error_of_bus(float length_m, float radius_m, float first_speed_mps
   return *std::max_element(first, first + inverse.num_steps);
 }
 
-TEST(RecordedWorlds, InverseActionsOfLongVehiclesComeBack) {
+TEST(RecordedWorlds, InverseActionsOfLongVehiclesReturnToTheRecord) {
   for (const float radius_m : {12.0f, 15.0f, 20.0f}) {
     for (const float speed_mps : {0.0f, 3.0f, 7.0f}) {
       EXPECT_LT(largest_error_of_bus(13.8f, radius_m, speed_mps), 0.5f) << radius_m << " m, " << speed_mps << " m/s";
@@ -634,7 +634,7 @@ TEST(RecordedWorlds, IdmFollowsThePathAndStopsBehindOthers) {
   }
 }
 
-TEST(RecordedWorlds, IdmFollowsLanesWhereItIsTold) {
+TEST(RecordedWorlds, IdmFollowsLanesIfConfigured) {
   const auto scene = crossing(kNobodyInTheWay);
   const int32_t self = mover(*scene, 40);
   const auto simulator = world_of(scene);
@@ -667,7 +667,7 @@ TEST(RecordedWorlds, IdmFollowsLanesWhereItIsTold) {
   EXPECT_EQ(simulator->totals().collisions + simulator->totals().off_road, 0);
 }
 
-TEST(RecordedWorlds, IdmFollowsLanesWhereThereIsNoRecord) {
+TEST(RecordedWorlds, IdmFollowsLanesWithoutARecord) {
   SimulatorConfig config;
   config.pedestrian_fraction = 0.2f;
   config.cyclist_fraction = 0.1f;
@@ -702,7 +702,7 @@ TEST(RecordedWorlds, IdmFollowsLanesWhereThereIsNoRecord) {
   EXPECT_EQ(hash[0], hash[1]);
 }
 
-TEST(RecordedWorlds, PathsAlongLanesEndWhereTheyDo) {
+TEST(RecordedWorlds, PathsAlongLanesEndWithTheirLanes) {
   const auto scene = crossing(kNobodyInTheWay);
   const auto simulator = world_of(scene);
   const MapView map = simulator->maps()[0]->rules.view();
@@ -723,7 +723,7 @@ TEST(RecordedWorlds, PathsAlongLanesEndWhereTheyDo) {
   }
 }
 
-TEST(RecordedWorlds, RefuseWhatCannotBe) {
+TEST(RecordedWorlds, RefuseInvalidOptions) {
   const auto scene = crossing();
   const SimulatorConfig config = scene_config(*scene);
   const auto map = compile_scenario(scene, map_options(config));
@@ -744,7 +744,7 @@ TEST(RecordedWorlds, RefuseWhatCannotBe) {
               HasSubstr("expected a map of roads, got recorded scene"));
 }
 
-TEST(RecordedWorlds, WordsNameTracks) {
+TEST(RecordedWorlds, WordsSelectTracks) {
   const auto scene = crossing();
   const auto count = [&](const std::string& words) {
     int sum = 0;

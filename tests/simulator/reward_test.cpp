@@ -22,7 +22,7 @@ struct RewardTest : ::testing::Test {
   float coefficients[kNumConditioning] = {};
 };
 
-TEST_F(RewardTest, GoalPaysWaypointsAlwaysAndTheLastOneBelowItsSpeed) {
+TEST_F(RewardTest, GoalRewardsWaypointsAndTheLastOneOnlyBelowItsSpeed) {
   c(Conditioning::v_goal_mps) = 5;
   EXPECT_EQ(terms().goal, 0);
   facts.passed_waypoint = true;
@@ -102,7 +102,7 @@ TEST_F(RewardTest, VelocityReverseOverspeedTimestep) {
   EXPECT_NEAR(terms().timestep, -2.5e-6, 1e-11);
 }
 
-TEST_F(RewardTest, WithoutALaneNothingIsPaidForLanes) {
+TEST_F(RewardTest, LaneRewardsAreZeroWithoutALane) {
   for (int i = 0; i < kNumConditioning; ++i) coefficients[i] = 1;
   facts.fit = LaneFit{};
   EXPECT_NEAR(terms().lane_align, 0, 1e-7);

@@ -10,7 +10,7 @@
 namespace pictura {
 namespace {
 
-TEST(Road, FitsTheLaneUnderIt) {
+TEST(Road, FindsTheLaneUnderTheAgent) {
   const MapRules map = make_map_rules(*testing::stadium(200, 2), {});
   const LaneFit fit = fit_lane(map.view(), {55, 0.5f}, 0, 0.1f, -1);
   EXPECT_EQ(fit.lane, 0);
@@ -30,7 +30,7 @@ TEST(Road, KeepsItsLaneNearTheBorder) {
   EXPECT_EQ(fit_lane(map.view(), {55, 2.3f}, 0, 0, 0).lane, 4);
 }
 
-TEST(Road, PrefersTheLaneThatPointsItsWay) {
+TEST(Road, PrefersTheLaneInDrivingDirection) {
   // On a stadium two opposite lanes, at y = 0 and y = 40, are far apart. On a ring, heading decides nothing.
   const MapRules map = make_map_rules(*testing::ring_road(30), {});
   const LaneFit fit = fit_lane(map.view(), {0, -31}, 0, 0, -1);
@@ -38,14 +38,14 @@ TEST(Road, PrefersTheLaneThatPointsItsWay) {
   EXPECT_NEAR(fit.angle_rad, 0, 0.01);
 }
 
-TEST(Road, LevelsAreApart) {
+TEST(Road, LevelsAreSeparate) {
   const MapRules map = make_map_rules(*testing::stadium(200, 1), {});
   EXPECT_EQ(fit_lane(map.view(), {55, 0}, 3, 0, -1).lane, -1);
   EXPECT_FALSE(is_on_road(map.view(), {55, 0}, 3));
   EXPECT_TRUE(is_on_road(map.view(), {55, 0}, 1));
 }
 
-TEST(Road, KnowsTheDrivableSurface) {
+TEST(Road, IdentifiesTheDrivableSurface) {
   const MapRules map = make_map_rules(*testing::stadium(200, 2), {});
   EXPECT_TRUE(is_on_road(map.view(), {55, -1.9f}, 0));
   EXPECT_TRUE(is_on_road(map.view(), {55, 5.9f}, 0));
@@ -83,7 +83,7 @@ TEST(Road, OffRoadWhenTheCenterLeavesTheSurface) {
   EXPECT_EQ((stage.step(), stage.events(0)), kEventOffRoad);
 }
 
-TEST(Road, WallsHaltAndAreCountedApart) {
+TEST(Road, WallContactsHaltAndAreCountedSeparately) {
   const auto map = testing::stadium(200, 1);
   testing::Stage stage(map, 2);
   const std::vector<WallFace> walls{{{60, -1, 0}, {60, 1, 0}, 3}, {{160, -1, 8}, {160, 1, 8}, 3}};

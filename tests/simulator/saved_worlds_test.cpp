@@ -36,7 +36,7 @@ TEST(PartsOfWorlds, AreConsecutiveAndNearlyEqual) {
   }
 }
 
-TEST(PartsOfWorlds, HaveOneWorldAtLeast) {
+TEST(PartsOfWorlds, HaveAtLeastOneWorld) {
   const std::vector<WorldSpec> all{{0, 1, 0}, {0, 1, 1}, {0, 100, 2}, {0, 1, 3}};
   const size_t expected[] = {2, 1, 1};
   for (int part = 0; part < 3; ++part) EXPECT_EQ(worlds_in_part(all, part, 3).size(), expected[part]) << part;
@@ -97,7 +97,7 @@ TEST(PartsOfWorlds, StepAndSaveAsOneSimulatorDoes) {
 }
 
 // Two worlds of different moments in another order, without walls and entity observations.
-TEST(KeptWorlds, GoOnInAnotherSimulator) {
+TEST(KeptWorlds, ContinueExactlyInAnotherSimulator) {
   SimulatorConfig config{.seed = 5, .num_threads = 1, .episode_steps = 100, .reset_inactive_fraction = 2};
   const std::vector<std::shared_ptr<const RoadMap>> maps{load_map("procedural"), load_map("procedural:7")};
   const std::vector<WorldSpec> all{{0, 9, 4}, {1, 12, 5}, {0, 7, 6}};

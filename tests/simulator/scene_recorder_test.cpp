@@ -53,7 +53,7 @@ Scenario drive(Simulator& simulator, std::vector<std::vector<AgentBox>>* boxes_o
   return recorder.scenario();
 }
 
-TEST(SceneRecorder, EachLifeIsATrack) {
+TEST(SceneRecorder, RecordsEachLifeAsATrack) {
   const SimulatorConfig config{.num_threads = 1, .pedestrian_fraction = 0, .cyclist_fraction = 0, .parked_cars = 0};
   const auto street = std::make_shared<RoadMap>(parse_opendrive(test::open_street(120), "street.xodr"));
   const auto simulator = make_simulator("cpu", config, {street}, {{0, 6, 0}});
@@ -82,7 +82,7 @@ TEST(SceneRecorder, EachLifeIsATrack) {
   EXPECT_NE(scene.tracks.front().length_m, scene.tracks.back().length_m);
 }
 
-TEST(SceneRecorder, WhatWasDrivenIsSavedLoadedAndReplayed) {
+TEST(SceneRecorder, RecordedDrivesAreSavedLoadedAndReplayed) {
   const test::ScratchFolder folder;
   const auto simulator = town();
   std::vector<std::vector<AgentBox>> boxes;
@@ -152,7 +152,7 @@ TEST(SceneRecorder, LightsBecomeRecordedOnes) {
   }
 }
 
-TEST(SceneRecorder, AReplayedRecordingIsTheRecording) {
+TEST(SceneRecorder, AReplayedRecordingEqualsTheRecording) {
   const auto scene = test::crossing();
   const SimulatorConfig config = scene_config(*scene, 5, {.num_threads = 1});
   MapOptions options = map_options(config);
@@ -188,7 +188,7 @@ TEST(SceneRecorder, AReplayedRecordingIsTheRecording) {
   }
 }
 
-TEST(SceneRecorder, EndsWithTheEpisodeAndRefusesWhatItCannotRecord) {
+TEST(SceneRecorder, EndsWithTheEpisodeAndRefusesUnsupportedWorlds) {
   const SimulatorConfig config{.num_threads = 1, .episode_steps = 5};
   const auto simulator = make_simulator("cpu", config, {load_map("procedural:3")}, {{0, 4, 0}});
   SceneRecorder recorder(*simulator);
@@ -206,7 +206,7 @@ TEST(SceneRecorder, EndsWithTheEpisodeAndRefusesWhatItCannotRecord) {
   EXPECT_THAT(message_of<UsageError>([&] { cut.scenario("", 400); }), HasSubstr("got 400"));
 }
 
-TEST(SceneFile, DamagedAndForeignFilesAreRefusedByName) {
+TEST(SceneFile, ErrorsNameDamagedAndForeignFiles) {
   const test::ScratchFolder folder;
   const std::string path = folder.path() + "/x.scenario";
   write_scene_file(path, *test::crossing());

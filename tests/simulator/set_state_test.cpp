@@ -28,7 +28,7 @@ std::unique_ptr<Simulator> make(const SimulatorConfig& config, std::vector<World
 
 NamedArray named(std::string_view name, const auto& values) { return {name, Array(values)}; }
 
-TEST(ResetOfWorlds, BeginsThemAsASimulatorOfThatSeedAndLeavesTheOthers) {
+TEST(ResetOfWorlds, StartsChosenWorldsFromTheSeedAndKeepsOthers) {
   const std::vector<WorldSpec> worlds{{0, 12, 0}, {0, 9, 1}, {0, 12, 2}};
   const auto simulator = make(testing::cars({.seed = 3, .episode_steps = 30}), worlds);
   const auto untouched = make(testing::cars({.seed = 3, .episode_steps = 30}), worlds);
@@ -68,7 +68,7 @@ TEST(ResetOfWorlds, IsSavedAndUndoneByAResetOfAll) {
   EXPECT_EQ(simulator->state_hash(), first);
 }
 
-TEST(ResetOfWorlds, IsFollowedByTheLaneKeeper) {
+TEST(ResetOfWorlds, WorksWithTheLaneKeeper) {
   const auto simulator = make_simulator("cpu", {.pedestrian_fraction = 0}, {load_map("procedural:1")}, {{0, 6, 0}});
   const auto lane = make_controller("lane", *simulator, 0);
   std::vector<Command> commands(6);
@@ -82,7 +82,7 @@ TEST(ResetOfWorlds, IsFollowedByTheLaneKeeper) {
   EXPECT_GT(simulator->totals().distance_m, 10);
 }
 
-TEST(ResetOfWorlds, ClearsTheirResultsAndRefusesAnotherMask) {
+TEST(ResetOfWorlds, ClearsResultsAndRefusesMasksOfAnotherSize) {
   const auto simulator = make(testing::cars(), {{0, 12, 0}, {0, 12, 1}});
   const StepResult result = simulator->step(std::vector<int32_t>(24, kIdleAction));
   ASSERT_EQ(result.valid[3], 1);
@@ -96,7 +96,7 @@ TEST(ResetOfWorlds, ClearsTheirResultsAndRefusesAnotherMask) {
             "reset: world_mask: expected u8 [2] on cpu, got u8 [1] on cpu");
 }
 
-TEST(SetState, MovesAgentsAndWhatFollows) {
+TEST(SetState, MovesAgentsAndUpdatesDerivedState) {
   const auto simulator = make(testing::cars(), {{0, 4, 0}, {0, 3, 1}});
   run(simulator.get(), 5);
   const uint64_t reward_bits = simulator->state_hash();
@@ -121,7 +121,7 @@ TEST(SetState, MovesAgentsAndWhatFollows) {
   EXPECT_FLOAT_EQ(simulator->observations().ego[5 * kEgoFeatures] * kScaleSpeed_mps, 7) << "speed, by its scale";
 }
 
-TEST(SetState, LeavesAllOtherAgentsAndIsFoundByTheirObservations) {
+TEST(SetState, KeepsOtherAgentsAndUpdatesTheirObservations) {
   const auto simulator = make(testing::cars(), {{0, 2, 0}});
   const std::vector<int32_t> both{0, 1}, second{1};
   const std::vector<float> x_m{50, 62}, y_m{0, 0}, zeros{0, 0};
@@ -138,7 +138,7 @@ TEST(SetState, LeavesAllOtherAgentsAndIsFoundByTheirObservations) {
       << "nobody is met on the way to where an agent was put";
 }
 
-TEST(SetState, OntoAnotherIsACollisionOfTheNextStep) {
+TEST(SetState, OverlappingPosesCollideInTheNextStep) {
   const auto simulator = make(testing::cars({.reset_inactive_fraction = 2}), {{0, 2, 0}});
   const std::vector<int32_t> both{0, 1};
   const std::vector<float> x_m{50, 52}, zeros{0, 0};
@@ -156,7 +156,7 @@ TEST(SetState, OntoAnotherIsACollisionOfTheNextStep) {
   EXPECT_EQ(simulator->step(std::vector<int32_t>{kIdleAction, kIdleAction}).valid[0], 1);
 }
 
-TEST(SetState, OfAnAgentThatFoundNoPlaceCountsItAsSpawned) {
+TEST(SetState, CountsAnUnplacedAgentAsSpawned) {
   const auto simulator = make_simulator("cpu", testing::cars(), {testing::ring_road(40)}, {{0, 300, 0}});
   const SpawnReport before = simulator->spawn_report();
   ASSERT_GT(before.refused, 0);
@@ -175,7 +175,7 @@ TEST(SetState, OfAnAgentThatFoundNoPlaceCountsItAsSpawned) {
   EXPECT_EQ(after.asked, after.spawned + after.refused);
 }
 
-TEST(SetState, GoesOnAsARestoredSimulatorDoes) {
+TEST(SetState, ContinuesAsARestoredSimulatorDoes) {
   const auto simulator = make(testing::cars({.episode_steps = 40}), draw_worlds(2, 60, 1, 40, 1));
   const auto copy = make(testing::cars({.episode_steps = 40}), draw_worlds(2, 60, 1, 40, 1));
   for (uint32_t round = 0; round < 6; ++round) {
@@ -190,7 +190,7 @@ TEST(SetState, GoesOnAsARestoredSimulatorDoes) {
   }
 }
 
-TEST(SetState, RefusesWhatCannotBeSteppedOnAndStaysAsItWas) {
+TEST(SetState, RefusesInvalidStatesAndChangesNothing) {
   const auto simulator = make(testing::cars(), {{0, 4, 0}});
   const std::vector<uint8_t> before = simulator->save();
   const auto refusal = [&](const std::vector<int32_t>& slots, const std::vector<NamedArray>& fields) {
@@ -227,7 +227,7 @@ TEST(SetState, RefusesWhatCannotBeSteppedOnAndStaysAsItWas) {
   EXPECT_THAT(refusal({0, 1, 2, 3, 0}, {}), HasSubstr("at most 4"));
 }
 
-TEST(AgentStateArrays, AreEveryFieldByNameTypeAndShape) {
+TEST(AgentStateArrays, HaveEveryFieldWithNameTypeAndShape) {
   const auto simulator = make(testing::cars(), {{0, 4, 0}});
   const std::vector<NamedArray> arrays = agent_state_arrays(simulator->state(), 4, simulator->device());
   ASSERT_EQ(arrays.size(), std::size(kAgentFields));

@@ -93,7 +93,7 @@ double correlation(const std::vector<double>& a, const std::vector<double>& b) {
   return ab / std::sqrt(aa * bb);
 }
 
-TEST(Signal, IndependentLightsOfAJunctionShareNoDraw) {
+TEST(Signal, IndependentLightsOfAJunctionHaveSeparateDraws) {
   constexpr int kEpisodes = 4000;
   int always_green = 0, both_always_green = 0;
   std::array<std::vector<double>, 2> green_steps, red_steps, offsets;
@@ -197,20 +197,20 @@ TEST_F(RedLight, CrossingOnRedIsAnEvent) {
   EXPECT_EQ(stage.worlds.state.agents.status[0], AgentStatus::halted);
 }
 
-TEST_F(RedLight, OtherColoursAreNone) {
+TEST_F(RedLight, OtherColoursAreNotEvents) {
   for (const LightState state : {LightState::green, LightState::yellow, LightState::off, LightState::unknown}) {
     put_bumper(99.5f, 0, 0, 10);
     EXPECT_EQ(step_with(state), kEventNone);
   }
 }
 
-TEST_F(RedLight, StoppingBeforeTheLineIsNone) {
+TEST_F(RedLight, StoppingBeforeTheLineIsNotAnEvent) {
   put_bumper(98.5f, 0, 0, 10);
   EXPECT_EQ(step_with(LightState::red), kEventNone);
   EXPECT_EQ(step_with(LightState::red), kEventRedLight);  // half a metre later the bumper is past the line
 }
 
-TEST_F(RedLight, StandingOnALineThatTurnsRedIsNone) {
+TEST_F(RedLight, StandingOnALineThatTurnsRedIsNotAnEvent) {
   put_bumper(101, 0, 0, 0);
   EXPECT_EQ(step_with(LightState::yellow), kEventNone);
   EXPECT_EQ(step_with(LightState::red), kEventNone);
@@ -219,14 +219,14 @@ TEST_F(RedLight, StandingOnALineThatTurnsRedIsNone) {
   EXPECT_EQ(step_with(LightState::red), kEventNone);
 }
 
-TEST_F(RedLight, TheOtherWayIsNone) {
+TEST_F(RedLight, CrossingInTheOppositeDirectionIsNotAnEvent) {
   put_bumper(100.5f, 0, kPi, 10);
   EXPECT_EQ(step_with(LightState::red), kEventNone);
   put_bumper(100, 2.3f, 1.0f, 10);  // crosses at 57 degrees
   EXPECT_EQ(step_with(LightState::red), kEventNone);
 }
 
-TEST_F(RedLight, TheNextLaneIsNone) {
+TEST_F(RedLight, CrossingOnTheNextLaneIsNotAnEvent) {
   put_bumper(99.5f, 4, 0, 10);
   EXPECT_EQ(step_with(LightState::red), kEventNone);
 }
@@ -242,21 +242,21 @@ TEST_F(RedLight, ChangingIntoTheLanePastTheLineIsAnEvent) {
   EXPECT_EQ(step_with(LightState::green), kEventNone);
 }
 
-TEST_F(RedLight, ChangingIntoTheLaneBeforeTheLineIsNone) {
+TEST_F(RedLight, ChangingIntoTheLaneBeforeTheLineIsNotAnEvent) {
   put_bumper(95, 0.8f, -0.3f, 5);
   stage.worlds.state.agents.lane[0] = 4;
   EXPECT_EQ(step_with(LightState::red), kEventNone);
   EXPECT_EQ(stage.worlds.state.agents.lane[0], 0);
 }
 
-TEST_F(RedLight, ChangingIntoTheLaneFarPastTheLineIsNone) {
+TEST_F(RedLight, ChangingIntoTheLaneFarPastTheLineIsNotAnEvent) {
   put_bumper(111, 0.8f, -0.3f, 5);
   stage.worlds.state.agents.lane[0] = 4;
   EXPECT_EQ(step_with(LightState::red), kEventNone);
   EXPECT_EQ(stage.worlds.state.agents.lane[0], 0);
 }
 
-TEST_F(RedLight, TurningRightIntoTheHeldLaneIsNone) {
+TEST_F(RedLight, TurningRightIntoTheHeldLaneIsNotAnEvent) {
   // From the left across the road into the held lane, past the line: still 60 degrees off the lane's direction.
   put_bumper(103, 0.3f, -1.05f, 5);
   stage.worlds.state.agents.lane[0] = 4;
@@ -292,7 +292,7 @@ std::shared_ptr<const RoadMap> short_section(bool is_endless) {
   return map;
 }
 
-TEST(RedLightSection, DrivingOnToTheNextLaneIsNone) {
+TEST(RedLightSection, ContinuingToTheNextLaneIsNotAnEvent) {
   for (const bool is_endless : {true, false}) {
     testing::Stage stage(short_section(is_endless), 1);
     stage.put(0, {99.8f, 0}, 0, 10);  // the bumper is a metre past the line: it crossed on yellow
@@ -314,7 +314,7 @@ TEST(RedLightSection, DrivingOnToTheNextLaneIsNone) {
   }
 }
 
-TEST(RedLightSection, LaneChangesAreWhatNoRouteDoes) {
+TEST(RedLightSection, LaneChangesAreTransitionsWithoutALink) {
   const MapRules map = make_map_rules(*short_section(false), {});
   EXPECT_FALSE(is_lane_change(map.view(), 0, 0));
   EXPECT_FALSE(is_lane_change(map.view(), 0, 4));
@@ -341,7 +341,7 @@ std::shared_ptr<const RoadMap> two_way_road(float median_m) {
   return map;
 }
 
-TEST(RedLightOnATwoWayRoad, DrivingRoundItOnTheOncomingLaneIsAnEvent) {
+TEST(RedLightOnATwoWayRoad, PassingALightOnTheOncomingLaneIsAnEvent) {
   for (const float median_m : {0.0f, 2.0f}) {
     testing::Stage stage(two_way_road(median_m), 1);
     const auto events = [&](Vec2 bumper, float heading_rad, LightState state) {
@@ -361,7 +361,7 @@ TEST(RedLightOnATwoWayRoad, DrivingRoundItOnTheOncomingLaneIsAnEvent) {
   }
 }
 
-TEST_F(RedLight, AnotherLevelIsNone) {
+TEST_F(RedLight, CrossingOnAnotherLevelIsNotAnEvent) {
   auto map = testing::stadium(200, 2);
   testing::add_light(map.get(), 100, 4, 1, {0});
   map->lights[0].stop_a_m.z = map->lights[0].stop_b_m.z = 6;

@@ -47,7 +47,7 @@ TEST(Worlds, FillTheSlotsExactly) {
   EXPECT_EQ(draw_worlds(3, 50, 50, 50, 1).size(), 1u);
 }
 
-TEST(Worlds, RefuseWhatCannotBeAskedFor) {
+TEST(Worlds, RefuseInvalidOptions) {
   EXPECT_THROW(draw_worlds(0, 0, 1, 120, 1), UsageError);
   EXPECT_THROW(draw_worlds(0, 100'000'000, 1, 120, 1), UsageError);
   EXPECT_THROW(draw_worlds(0, 10, 0, 120, 1), UsageError);
@@ -56,7 +56,7 @@ TEST(Worlds, RefuseWhatCannotBeAskedFor) {
   EXPECT_THROW(draw_worlds(0, 10, 1, 5, 0), UsageError);
 }
 
-TEST(Simulator, RefusesWhatCannotBeAskedFor) {
+TEST(Simulator, RefusesInvalidOptions) {
   const auto map = testing::ring_road(40);
   EXPECT_THROW(make_simulator("warp", {}, {map}, {{0, 1, 0}}), UsageError);
   EXPECT_THROW(make({}, map, {{0, 0, 0}}), UsageError);
@@ -81,7 +81,7 @@ TEST(Simulator, RefusesWhatCannotBeAskedFor) {
   }
 }
 
-TEST(Simulator, RefusesMoreThanFitsBeforeItAllocates) {
+TEST(Simulator, RefusesOversizedWorldsBeforeItAllocates) {
   using ::testing::HasSubstr;
   const auto worlds_of = [](int count) {
     std::vector<WorldSpec> worlds;
@@ -108,7 +108,7 @@ TEST(Simulator, RejectsAMapWithoutRoomToSpawn) {
   EXPECT_THROW(make(testing::cars(), std::make_shared<RoadMap>(), {{0, 1, 0}}), Error);
 }
 
-TEST(Simulator, RefusesActionsOutOfRangeAndStaysAsItWas) {
+TEST(Simulator, RefusesActionsOutOfRangeAndChangesNothing) {
   const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 4, 0}});
   const uint64_t before = simulator->state_hash();
   std::vector<int32_t> actions(4, kCoast);
@@ -119,7 +119,7 @@ TEST(Simulator, RefusesActionsOutOfRangeAndStaysAsItWas) {
   EXPECT_EQ(simulator->state_hash(), before);
 }
 
-TEST(Simulator, RefusesActionsThatAreNotTheArrayThatItExpects) {
+TEST(Simulator, RefusesActionArraysOfWrongTypeOrSize) {
   const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 4, 0}});
   const uint64_t before = simulator->state_hash();
   std::vector<int32_t> actions(8, kCoast);
@@ -174,7 +174,7 @@ TEST(Simulator, SpawnsWithoutOverlapAndCountsRefusals) {
   for (size_t i = 0; i < 200; ++i) EXPECT_EQ(result.valid[i], scene.agents[i].drawn);
 }
 
-TEST(Simulator, ViewsStandAtTheRearAxle) {
+TEST(Simulator, ViewsAreAtTheRearAxle) {
   const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 2, 0}, {0, 3, 1}});
   EXPECT_EQ(simulator->scene().world_begin[2], 5);
   for (size_t i = 0; i < 5; ++i) {
@@ -256,7 +256,7 @@ TEST(Simulator, AWorldHolds4096Agents) {
   EXPECT_THROW(make({}, map, {{0, kMaxAgentsPerWorld + 1, 0}}), UsageError);
 }
 
-TEST(Simulator, InfractionsTerminateAndTooManyOfThemEndTheEpisode) {
+TEST(Simulator, InfractionsTerminateAgentsAndManyEndTheEpisode) {
   // Full throttle straight on leaves the ring; the episode ends when the fourth of ten agents halts.
   const auto simulator = make(testing::cars(), testing::ring_road(40), {{0, 10, 0}});
   std::vector<int32_t> actions(10, 3 * kNumLatActions + 1);
@@ -295,7 +295,7 @@ TEST(Simulator, EpisodesDifferAndResetReturnsToTheFirst) {
   EXPECT_NE(other_seed->state_hash(), first);
 }
 
-TEST(Simulator, AWorldIsTheSameWhateverStandsBesideIt) {
+TEST(Simulator, AWorldDoesNotDependOnOtherWorlds) {
   const auto map = testing::stadium(200, 2);
   const auto both = make(testing::cars({.num_threads = 1}), map, {{0, 12, 0}, {0, 12, 1}});
   const auto second = make(testing::cars({.num_threads = 1}), map, {{0, 12, 1}});
@@ -310,7 +310,7 @@ TEST(Simulator, AWorldIsTheSameWhateverStandsBesideIt) {
   }
 }
 
-TEST(Simulator, ThreadsDoNotMatter) {
+TEST(Simulator, ResultsDoNotDependOnThreads) {
   auto map = testing::stadium(200, 2);
   testing::add_light(map.get(), 100, 8, 2, {0, 4});
   std::vector<uint64_t> hashes;
@@ -372,7 +372,7 @@ void expect_equal(Simulator* a, Simulator* b) {
   EXPECT_TRUE(testing::same_bits(a->slots().agent_of_slot, b->slots().agent_of_slot));
 }
 
-TEST(Simulator, OtherWorldsAreThoseOfANewSimulator) {
+TEST(Simulator, ReplacedWorldsEqualThoseOfANewSimulator) {
   SimulatorConfig config{.episode_steps = 25, .parked_cars = 5};
   const CompiledMaps maps =
       compile_maps({testing::stadium(200, 2), testing::ring_road(40), load_map("procedural:1")}, map_options(config));
@@ -401,7 +401,7 @@ TEST(Simulator, OtherWorldsAreThoseOfANewSimulator) {
   EXPECT_EQ(simulator->generation(), 1);
 }
 
-TEST(Simulator, AddressesLastWithinWhatIsReserved) {
+TEST(Simulator, AddressesStayValidWithinReservedCapacity) {
   const SimulatorConfig config = testing::cars();
   const CompiledMaps maps = compile_maps({testing::stadium(200, 2)}, map_options(config));
   const auto simulator = make_simulator("cpu", config, maps, {{0, 10, 0}});
@@ -453,7 +453,7 @@ TEST(Simulator, MapsAreSharedAndNamedByHandles) {
               HasSubstr("map ring: expected a map compiled with light heads as_mapped, got visible"));
 }
 
-TEST(Simulator, ASnapshotIsTheStateThatWas) {
+TEST(Simulator, ASnapshotKeepsItsState) {
   const SimulatorConfig config = testing::cars({.episode_steps = 20});
   const auto simulator = make(config, testing::stadium(200, 2), draw_worlds(2, 60, 1, 40, 1));
   run(simulator.get(), 35);
@@ -523,7 +523,7 @@ TEST(Simulator, StaggeredWorldsEndTheirEpisodesAtDifferentTimes) {
   EXPECT_NE(fresh[0], first);
 }
 
-TEST(Simulator, StaggeredWorldsGoOnFromASavedStateAsTheyWould) {
+TEST(Simulator, StaggeredWorldsContinueExactlyFromASavedState) {
   const SimulatorConfig config =
       testing::cars({.episode_steps = 90, .reset_inactive_fraction = 2, .stagger_episodes = true});
   const std::vector<WorldSpec> worlds = draw_worlds(2, 30, 1, 3, 1);
@@ -545,7 +545,7 @@ TEST(Simulator, ShortEpisodesAreNotStaggered) {
   }
 }
 
-TEST(Simulator, RestoreSaysWhatDiffers) {
+TEST(Simulator, RestoreErrorsNameTheDifference) {
   using ::testing::HasSubstr;
   const auto make_map = [] {
     auto map = testing::stadium(200, 2);
@@ -587,7 +587,7 @@ TEST(Simulator, RestoreSaysWhatDiffers) {
   }
 }
 
-TEST(Simulator, RestoreRefusesFieldsOutOfRangeAndStaysAsItWas) {
+TEST(Simulator, RestoreRefusesFieldsOutOfRangeAndChangesNothing) {
   using ::testing::HasSubstr;
   const auto map = testing::stadium(200, 2);
   const std::vector<WorldSpec> worlds{{0, 4, 0}};
@@ -616,7 +616,7 @@ TEST(Simulator, RestoreRefusesFieldsOutOfRangeAndStaysAsItWas) {
   EXPECT_EQ(test::message_of([&] { simulator->restore(make(testing::cars(), map, worlds)->save()); }), test::kNoError);
 }
 
-TEST(Simulator, ConditioningIsDrawnAsThePaperSays) {
+TEST(Simulator, ConditioningIsDrawnAsInThePaper) {
   const auto simulator = make(testing::cars(), testing::stadium(1500, 2), draw_worlds(1, 4000, 100, 100, 1));
   const AgentStateView state = simulator->state();
   for (int c = 0; c < kNumConditioning; ++c) {
@@ -639,7 +639,7 @@ TEST(Simulator, ConditioningIsDrawnAsThePaperSays) {
   }
 }
 
-TEST(Simulator, WithoutVectorObservationsTheRestIsTheSame) {
+TEST(Simulator, DisablingVectorObservationsChangesNothingElse) {
   const auto with = make(testing::cars(), testing::ring_road(40), {{0, 8, 0}});
   const auto without = make(testing::cars({.vector_observations = false}), testing::ring_road(40), {{0, 8, 0}});
   run(with.get(), 50);
@@ -765,7 +765,7 @@ TEST(Simulator, TotalsCountFirstMovesAndPassedWaypoints) {
   EXPECT_EQ(both.finished_passed_waypoint, first.finished_passed_waypoint);
 }
 
-TEST(Simulator, ClassesComeInThePapersSharesEachWithItsSizes) {
+TEST(Simulator, ClassesHaveThePapersSharesAndSizes) {
   SimulatorConfig config;
   EXPECT_EQ(config.parked_cars, 32);
   EXPECT_TRUE(config.walls);
@@ -804,7 +804,7 @@ TEST(Simulator, CyclistsAreSmallerAndSlower) {
   EXPECT_NEAR(cyclists, 50, 18);
 }
 
-TEST(Simulator, ParkedCarsStandOffTheRoadAndInTheWay) {
+TEST(Simulator, ParkedCarsStandBesideAndOnTheRoad) {
   auto map = testing::ring_road(40);
   // A sidewalk outside the outer edge, at 42 m: cars of 1.6 to 2.2 m stand 0.2 m from the sidewalk.
   Lane sidewalk;
@@ -876,7 +876,7 @@ TEST(Simulator, AWorldWithoutAgentsEndsAfterOneStep) {
 }
 
 /// A real town: in a run long enough for every event to happen, the counts must be consistent.
-TEST(Simulator, Town01HoldsTogether) {
+TEST(Simulator, Town01RunsWithValidStates) {
   const char* data = std::getenv("PICTURA_DATA");
   if (!data) GTEST_SKIP() << "PICTURA_DATA names no folder of maps";
   const auto map = load_map("Town01");

@@ -38,7 +38,7 @@ std::vector<std::string> all_towns() {
   return towns;
 }
 
-TEST(Towns, AccountForEveryAgentThatIsAskedFor) {
+TEST(Towns, AccountForEveryRequestedAgent) {
   for (const std::string& town : all_towns()) {
     SCOPED_TRACE(town);
     const auto simulator = make_simulator("cpu", whole_world(), {load_map(town)}, {{0, 1024, 0}});

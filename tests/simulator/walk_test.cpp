@@ -72,7 +72,7 @@ TEST(Walkways, FollowSidewalksInBothDirectionsAndJoinWhereTheyMeet) {
   }
 }
 
-TEST(Walkways, ManyCrosswalksTakeTimeAsTheirNumber) {
+TEST(Walkways, BuildTimeIsLinearInCrosswalks) {
   constexpr float kLength_m = 20'000;
   constexpr int kCrosswalks = 40'000;
   auto map = testing::stadium(kLength_m, 1);
@@ -101,7 +101,7 @@ TEST(Walkways, CrosswalksLeadOverTheRoad) {
   EXPECT_EQ(std::count_if(walkways.pieces.begin(), walkways.pieces.end(), crosses), 2);
 }
 
-TEST(Walkways, LeaveOutWhatLiesOnTheRoadAndWhatLeadsNowhere) {
+TEST(Walkways, LeaveOutSidewalksOnTheRoadAndDeadStubs) {
   auto map = street();
   // Sidewalks over the road and onto a stub of 30 m: neither is a walkway.
   testing::add_side_lane(map.get(), LaneType::sidewalk, straight({20, -1}, {20, 1}, 1));
@@ -109,7 +109,7 @@ TEST(Walkways, LeaveOutWhatLiesOnTheRoadAndWhatLeadsNowhere) {
   EXPECT_NEAR(total_m(world_map(*map).walkways), 2 * 400, 1);
 }
 
-TEST(Walkways, AreShouldersWhereThereIsNoSidewalk) {
+TEST(Walkways, UseShouldersWithoutASidewalk) {
   auto map = testing::stadium(200, 1);
   testing::add_side_lane(map.get(), LaneType::shoulder, straight({0, -3}, {200, -3}, 20));
   testing::add_side_lane(map.get(), LaneType::median, straight({0, 4}, {200, 4}, 20));
@@ -118,7 +118,7 @@ TEST(Walkways, AreShouldersWhereThereIsNoSidewalk) {
   EXPECT_NEAR(total_m(world_map(*map).walkways), 2 * 100, 1);
 }
 
-TEST(Walkways, StrollsHaveTheirLengthAndTurnBackAtDeadEnds) {
+TEST(Walkways, WalksHaveTheirLengthAndTurnBackAtDeadEnds) {
   const MapRules map = world_map(*street());
   const MapView view = map.view();
   for (uint32_t i = 0; i < 200; ++i) {
@@ -142,7 +142,7 @@ SimulatorConfig pedestrians_only() {
   return config;
 }
 
-TEST(Pedestrians, StandAndAimOnWalkwaysAndAreToldOfGoalsAndCollisionsAlone) {
+TEST(Pedestrians, UseWalkwaysAndHaveOnlyGoalAndCollisionEvents) {
   auto map = street();
   testing::add_crosswalk(map.get(), {{48.5f, -3, 0}, {51.5f, -3, 0}, {51.5f, 3, 0}, {48.5f, 3, 0}});
   testing::Stage stage(map, 40, pedestrians_only());
@@ -251,7 +251,7 @@ TEST(Pedestrians, DoNotAimAtPlacesUnderParkedCars) {
   }
 }
 
-TEST(Pedestrians, AreRefusedWhereThereIsNowhereToWalk) {
+TEST(Pedestrians, AreRefusedWithoutWalkways) {
   SimulatorConfig config = testing::cars();
   config.pedestrian_fraction = 0.5f;
   const auto simulator = make_simulator("cpu", config, {testing::ring_road(100)}, {{0, 40, 0}});

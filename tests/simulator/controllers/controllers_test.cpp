@@ -70,7 +70,7 @@ TEST(Controller, RandomActionsOfManySlotsDiffer) {
   EXPECT_NEAR(alike, 20 * 94 / 12.0, 60);
 }
 
-TEST(Controller, RandomActionsGoOnWithARestoredSimulator) {
+TEST(Controller, RandomActionsContinueWithARestoredSimulator) {
   const SimulatorConfig config = testing::cars({.episode_steps = 30});
   const std::vector<WorldSpec> worlds{{0, 20, 0}};
   const auto first = make(config, testing::stadium(200, 2), worlds);
@@ -128,7 +128,7 @@ TEST(Controller, LaneKeepingNeedsTheEpisodesFirstStep) {
               HasSubstr("expected to act from the first step of episode"));
 }
 
-TEST(Commands, OfActionsStepAsActionsDo) {
+TEST(Commands, ActionCommandsEqualActions) {
   const auto a = make(testing::cars(), testing::stadium(200, 2), {{0, 30, 0}, {0, 10, 1}});
   const auto b = make(testing::cars(), testing::stadium(200, 2), {{0, 30, 0}, {0, 10, 1}});
   for (uint32_t step = 0; step < 100; ++step) {
@@ -141,7 +141,7 @@ TEST(Commands, OfActionsStepAsActionsDo) {
   EXPECT_EQ(a->save(), b->save());
 }
 
-TEST(Commands, AKinematicStateIsWhereTheAgentThenIs) {
+TEST(Commands, AKinematicStateSetsTheNextPose) {
   const auto simulator = make(testing::cars(), testing::stadium(200, 2), {{0, 2, 0}});
   const AgentStateView state = simulator->state();
   std::vector<Command> commands(2);
@@ -208,7 +208,7 @@ TEST(Commands, AbsentAgentsLeaveTheirEpisode) {
   EXPECT_EQ(simulator->state().status[1], AgentStatus::active);
 }
 
-TEST(Commands, OutOfRangeAreRefusedByNameAndChangeNothing) {
+TEST(Commands, ErrorsNameCommandsOutOfRangeAndChangeNothing) {
   const auto simulator = make(testing::cars(), testing::stadium(200, 2), {{0, 4, 0}});
   const uint64_t before = simulator->state_hash();
   std::vector<Command> commands(4);

@@ -49,30 +49,30 @@ void expect_lane_keeping(const std::vector<std::string>& towns, float cyclist_fr
   }
 }
 
-TEST(LaneKeeping, OfABicycleKeepsItsLaneAndStopsAtRedLightsInEveryTown) {
+TEST(LaneKeeping, ABicycleKeepsItsLaneAndStopsAtRedLightsInEveryTown) {
   expect_lane_keeping(towns_to_drive(), 1, 16, 1, 600);
 }
 
-TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInEveryTown) {
+TEST(LaneKeeping, ACarKeepsItsLaneAndStopsAtRedLightsInEveryTown) {
   expect_lane_keeping(towns_to_drive(), 0, 24, 1, 1280);
 }
 
-TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInACopyOfEveryTown) {
+TEST(LaneKeeping, ACarKeepsItsLaneAndStopsAtRedLightsInACopyOfEveryTown) {
   std::vector<std::string> copies;
   for (const std::string& town : towns_to_drive()) copies.push_back(map_copy_name(town, 1));
   expect_lane_keeping(copies, 0, 12, 1, 1280);
 }
 
-TEST(LaneKeeping, OfACarKeepsItsLaneAndStopsAtRedLightsInTwentyCities) {
+TEST(LaneKeeping, ACarKeepsItsLaneAndStopsAtRedLightsInTwentyCities) {
   expect_lane_keeping(expand_map_names({"city:1000-1019"}), 0, 16, 1, 600);
 }
 
-TEST(LaneKeeping, OfThreeTouchesNoOtherInEveryTown) { expect_lane_keeping(towns_to_drive(), 0.2f, 48, 3, 600); }
+TEST(LaneKeeping, ThreeAgentsDoNotCollideInEveryTown) { expect_lane_keeping(towns_to_drive(), 0.2f, 48, 3, 600); }
 
 /// As many agents as in the evaluation's medium density. 277 of these 1,080 agents halted when agents relied on the
 /// agent ahead to brake and did not look beside them before lane changes. Now 10 halt: five pairs where one agent
 /// changes lanes in a bend and predicts that others go straight on. None leaves the road.
-TEST(LaneKeeping, OfATownFullOfTrafficSeldomCollides) {
+TEST(LaneKeeping, DenseTrafficSeldomCollides) {
   std::vector<std::string> towns = known_towns();
   towns.emplace_back("procedural");
   constexpr int kAgents = 120, kSteps = 600;
@@ -179,21 +179,21 @@ std::vector<DrivenEpisode> drive_turnarounds(double lane_m, float cyclist_fracti
                                      400);
 }
 
-TEST(LaneKeeping, OfABicycleTurnsAtTheEndOfAStreet) {
+TEST(LaneKeeping, ABicycleTurnsAtTheEndOfAStreet) {
   for (const DrivenEpisode& driven : drive_turnarounds(4, 1, 4, 1)) {
     EXPECT_EQ(driven.halt_reason, kEventNone) << "at " << driven.end_m.x << ' ' << driven.end_m.y;
     EXPECT_GT(driven.distance_m, 130);
   }
 }
 
-TEST(LaneKeeping, OfACarStopsWhereItCannotTurn) {
+TEST(LaneKeeping, ACarStopsWhereItCannotTurn) {
   for (const DrivenEpisode& driven : drive_turnarounds(4, 0, 3, 1)) {
     EXPECT_EQ(driven.halt_reason, kEventNone) << "at " << driven.end_m.x << ' ' << driven.end_m.y;
     EXPECT_LT(driven.distance_m, 130);
   }
 }
 
-TEST(LaneKeeping, StaysOnTheRoadWhereWideLanesTurn) {
+TEST(LaneKeeping, StaysOnTheRoadInTurnsOfWideLanes) {
   for (const DrivenEpisode& driven : drive_turnarounds(8, 0.75f, 16, 1)) {
     EXPECT_EQ(driven.halt_reason, kEventNone) << "at " << driven.end_m.x << ' ' << driven.end_m.y;
     EXPECT_GT(driven.distance_m, 10);
@@ -201,7 +201,7 @@ TEST(LaneKeeping, StaysOnTheRoadWhereWideLanesTurn) {
 }
 
 /// The front cars stop, and the cars behind them stop too.
-TEST(LaneKeeping, InAQueueBeforeATurnStaysOnTheRoad) {
+TEST(LaneKeeping, StaysOnTheRoadInAQueueBeforeATurn) {
   float distance_m = 0;
   for (const DrivenEpisode& driven : drive_turnarounds(8, 0.2f, 1, 8)) {
     EXPECT_EQ(driven.halt_reason & kEventOffRoad, 0) << "at " << driven.end_m.x << ' ' << driven.end_m.y;
@@ -210,7 +210,7 @@ TEST(LaneKeeping, InAQueueBeforeATurnStaysOnTheRoad) {
   EXPECT_GT(distance_m, 150);
 }
 
-TEST(LaneKeeping, GivesUpWaypointsThatItCannotReachAnyMore) {
+TEST(LaneKeeping, DropsUnreachableWaypoints) {
   const auto map = std::make_shared<RoadMap>(parse_opendrive(short_sections_into_a_ring(), "short_sections.xodr", {}));
   for (uint64_t seed = 0; seed < 4; ++seed) {
     double distance_m = 0;
@@ -237,7 +237,7 @@ TEST(LaneKeeping, ReachesAThroughLaneTwoChangesAway) {
   EXPECT_GT(goals, 16);
 }
 
-TEST(Idm, StaysOnTheRoadWhereTheThroughLaneIsTwoChangesAway) {
+TEST(Idm, StaysOnTheRoadWithTheThroughLaneTwoChangesAway) {
   const auto map = std::make_shared<RoadMap>(parse_opendrive(through_lane_two_changes_away(), "two_changes.xodr", {}));
   const auto simulator =
       make_simulator("cpu", testing::cars({.num_threads = 1}), {map}, {{0, 16, 0}, {0, 16, 1}, {0, 16, 2}});
@@ -262,7 +262,7 @@ void expect_smooth(const std::vector<PathPoint>& points) {
   }
 }
 
-TEST(LanePath, DrawsALaneChangeOutOverTheRoomThereIs) {
+TEST(LanePath, ExtendsALaneChangeOverTheAvailableLength) {
   const auto map = testing::stadium(200, 2);
   testing::Stage stage(map, 1);
   const LaneGraph graph(*map);
@@ -280,7 +280,7 @@ TEST(LanePath, DrawsALaneChangeOutOverTheRoomThereIs) {
   }
 }
 
-TEST(LanePath, GoesRoundForALaneChangeWithoutRoom) {
+TEST(LanePath, TakesAnotherLapForALaneChangeWithoutRoom) {
   const auto map = testing::stadium(200, 2);
   testing::Stage stage(map, 1);
   const LaneGraph graph(*map);
@@ -336,7 +336,7 @@ struct LongCarOnARing {
   std::optional<LanePath> path;
 };
 
-TEST(SteeringSearch, FindsTheWayRoundThatTheMiddleOfTheLaneIsNot) {
+TEST(SteeringSearch, FindsAPathWhereTheLaneCenterLeavesTheRoad) {
   // The road runs from 4.5 to 8.5 m. The axle's circle must be between 5.6 and 6.17 m; the lane's middle is at 6.5 m.
   LongCarOnARing car(6.5f, 6);
   const DrivenAgent agent(car.stage.world(), 0);
@@ -355,7 +355,7 @@ TEST(SteeringSearch, FindsTheWayRoundThatTheMiddleOfTheLaneIsNot) {
   EXPECT_GT(car.stage.worlds.state.agents.distance_m[0], 20);
 }
 
-TEST(SteeringSearch, MakesNoMoreNodesThanItMay) {
+TEST(SteeringSearch, RespectsTheNodeLimit) {
   LongCarOnARing car(6.5f, 6);
   const DrivenAgent agent(car.stage.world(), 0);
   size_t nodes_left = 1000;
@@ -385,7 +385,7 @@ TEST(SteeringSearch, EndsAtAnExit) {
   EXPECT_TRUE(stage.worlds.state.agents.left[0]);
 }
 
-TEST(SteeringSearch, SaysHowFarItGetsWhereNoCarCan) {
+TEST(SteeringSearch, ReturnsAPartialPlanOnAnImpassableRoad) {
   // The road runs from 3.4 to 7.4 m. On the tightest circle the front corner is 7.83 m from the centre.
   LongCarOnARing car(5.4f, 4.6f);
   const DrivenAgent agent(car.stage.world(), 0);
