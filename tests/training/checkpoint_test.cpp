@@ -99,7 +99,7 @@ std::string as_version_1(const std::string& file) {
   return as_version_1(file, header_of(file), file.substr(data_begin, file.size() - data_begin - kHashBytes));
 }
 
-TEST_F(CheckpointFile, ComesBackWhole) {
+TEST_F(CheckpointFile, ReadsBackEqual) {
   const Config config = small_config();
   const PolicyNetwork policy(config.policy, 4, 1);
   write_checkpoint(folder_ / "a.ckpt", small_checkpoint(policy, config));
@@ -128,7 +128,7 @@ TEST_F(CheckpointFile, ComesBackWhole) {
   EXPECT_EQ(back.second_moments[3].value.flatten()[0].item<float>(), 2.5f);
 }
 
-TEST_F(CheckpointFile, OtherArchitecturesAreRefusedByName) {
+TEST_F(CheckpointFile, ErrorsNameOtherArchitectures) {
   Config config = small_config();
   const PolicyNetwork policy(config.policy, 4, 1);
   write_checkpoint(folder_ / "a.ckpt", small_checkpoint(policy, config));
@@ -145,7 +145,7 @@ TEST_F(CheckpointFile, OtherArchitecturesAreRefusedByName) {
               HasSubstr("no parameter 'conv.0.weight'"));
 }
 
-TEST_F(CheckpointFile, WeightsThatAreNotFiniteAreRefusedByName) {
+TEST_F(CheckpointFile, ErrorsNameNonFiniteWeights) {
   const Config config = small_config();
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
     const PolicyNetwork policy(config.policy, 4, 1);
@@ -172,7 +172,7 @@ TEST(Rigs, DifferencesAreNamed) {
   EXPECT_EQ(first_difference(saved, now), "4 cameras became 3");
 }
 
-TEST_F(CheckpointFile, FilesWithoutAnEndAreRefusedByHowTheyBegin) {
+TEST_F(CheckpointFile, EndlessFilesAreRefusedByTheirHeader) {
   EXPECT_THAT(message_of([] { read_policy("/dev/zero"); }), HasSubstr("/dev/zero: expected a checkpoint"));
   EXPECT_THAT(message_of([] { read_checkpoint("/dev/urandom"); }), HasSubstr("/dev/urandom: expected a checkpoint"));
 }
@@ -242,7 +242,7 @@ TEST_F(CheckpointFile, AnyFlippedBitIsRefused) {
   EXPECT_NO_THROW(read_checkpoint(path));
 }
 
-TEST_F(CheckpointFile, Version1ReadsAsBefore) {
+TEST_F(CheckpointFile, Version1IsRead) {
   const Config config = small_config();
   const PolicyNetwork policy(config.policy, 4, 1);
   const std::string path = folder_ / "a.ckpt";
@@ -256,7 +256,7 @@ TEST_F(CheckpointFile, Version1ReadsAsBefore) {
   EXPECT_EQ(other.hash(), policy.hash());
 }
 
-TEST_F(CheckpointFile, TheSchemaIsThatOfTheArraysThatThePolicyReads) {
+TEST_F(CheckpointFile, TheSchemaListsTheArraysOfThePolicy) {
   Config config = small_config();
   const std::string path = folder_ / "a.ckpt";
   auto schema_of = [&] {
@@ -284,7 +284,7 @@ TEST_F(CheckpointFile, TheSchemaIsThatOfTheArraysThatThePolicyReads) {
       ::testing::AllOf(HasSubstr("a.ckpt: observation schema: walls"), HasSubstr("[80,7]"), HasSubstr("no value")));
 }
 
-TEST_F(CheckpointFile, SavedUnderTheOldNameOfTheBackendsItReadsAsBefore) {
+TEST_F(CheckpointFile, TheOldBackendKeyIsRead) {
   const Config config = small_config();
   const PolicyNetwork policy(config.policy, 4, 1);
   const std::string path = folder_ / "a.ckpt";
@@ -331,7 +331,7 @@ TEST_F(CheckpointFile, SafetensorsHoldEveryParameter) {
   EXPECT_EQ(8 + header_bytes + end, bytes.size());
 }
 
-TEST_F(CheckpointFile, APolicyDrivesFromSafetensorsAsFromItsCheckpoint) {
+TEST_F(CheckpointFile, SafetensorsAndCheckpointDriveIdentically) {
   const Config config = small_config();
   const PolicyNetwork policy(config.policy, 4, 1);
   const Checkpoint checkpoint = small_checkpoint(policy, config);

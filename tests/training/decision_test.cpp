@@ -64,7 +64,7 @@ TEST(HeldActions, ReturnTheSumOfDiscountedRewards) {
               ElementsAre(1 + .5f * 2 + .25f * 20 - 10 + .125f * cut_off, 0, cut_off, 0, 0, third));
 }
 
-TEST(HeldActions, AreDecidedAgainWhereTheClockOrANewEpisodeSaysSo) {
+TEST(HeldActions, AreChosenAgainAtIntervalsAndEpisodeStarts) {
   SimulatorConfig config;
   config.episode_steps = 4;
   config.reset_inactive_fraction = 2;
@@ -88,7 +88,7 @@ TEST(HeldActions, AreDecidedAgainWhereTheClockOrANewEpisodeSaysSo) {
   EXPECT_EQ(deciding, "dhhddddhhddh");
 }
 
-TEST(HeldActions, AreDecidedWhereALifeBeginsAndAgentsHaveLeft) {
+TEST(HeldActions, AreChosenAgainAtTheStartOfALife) {
   SimulatorConfig config;
   config.num_threads = 1;
   config.pedestrian_fraction = config.cyclist_fraction = 0;
@@ -124,7 +124,7 @@ std::vector<std::string> held(const char* modality) {
   return {modality, "policy.decision_steps=3", "simulator.episode_steps=8"};
 }
 
-TEST(HeldActions, AreWhatARolloutHas) {
+TEST(HeldActions, AreStoredInARollout) {
   const test::ScratchFolder folder;
   const TrainOptions options = test::small_run(folder / "run", "cpu", held("policy.modality=vector"));
   pictura::Run run(load_config(options.config_path, options.overrides), Device{});
@@ -155,7 +155,7 @@ TEST(HeldActions, AreWhatARolloutHas) {
   EXPECT_GT(num_final, 2);
 }
 
-TEST(HeldActions, ARunGoesOnExactly) {
+TEST(HeldActions, ResumesExactly) {
   for (const char* modality : {"policy.modality=vector", "policy.modality=perspective"}) {
     const test::ScratchFolder folder;
     const auto [whole, again, resumed] = test::policies_of_equal_runs(folder / "runs", "cpu", held(modality));
@@ -164,7 +164,7 @@ TEST(HeldActions, ARunGoesOnExactly) {
   }
 }
 
-TEST(HeldActions, AreHeldWhereverAPolicyDrives) {
+TEST(HeldActions, AreHeldByEveryDrivingPolicy) {
   const test::ScratchFolder folder;
   TrainOptions options = test::small_run(folder / "run", "cpu", held("policy.modality=vector"));
   options.overrides.push_back("train.updates=1");
@@ -190,7 +190,7 @@ TEST(HeldActions, AreHeldWhereverAPolicyDrives) {
   EXPECT_TRUE(changes);
 }
 
-TEST(HeldActions, DivideARollout) {
+TEST(HeldActions, StepsDivideARollout) {
   EXPECT_THAT(
       test::message_of([] { parse_config("[policy]\ndecision_steps = 3\n[train]\nnum_steps = 64\n", "a.toml"); }),
       HasSubstr("train.num_steps: expected a multiple of policy.decision_steps (3), got 64"));

@@ -126,7 +126,7 @@ TEST_P(EachModality, LearnsInEachPrecision) {
   }
 }
 
-TEST_P(EachModality, AReproducibleRunGivesTheSamePolicyInEachPrecision) {
+TEST_P(EachModality, ReproducibleRunsGiveEqualPoliciesInEachPrecision) {
   for (const char* precision : {"fp32", "tf32", "bf16"}) {
     SCOPED_TRACE(precision);
     const auto [whole, again, resumed] = test::policies_of_equal_runs(
@@ -139,7 +139,7 @@ TEST_P(EachModality, AReproducibleRunGivesTheSamePolicyInEachPrecision) {
 
 // The same actions are drawn in the same worlds, unless a rounding error decides: one draw in a million or so. So the
 // simulators' counts are equal. Losses are means over minibatches between which roundings accumulate.
-TEST_P(EachModality, TheFirstUpdateIsTheHosts) {
+TEST_P(EachModality, TheFirstUpdateMatchesTheHosts) {
   train(options("host", "cpu", one_update()));
   train(options("device", "cuda", one_update()));
   expect_same_first_update(folder_ / "host", folder_ / "device", 1e-6, 2e-2);
@@ -156,7 +156,7 @@ TEST_F(DeviceTraining, SegmentsAreReadAsOnTheHost) {
                                 "train.updates=1", "train.num_steps=30", "train.forward_chunk=3"});
 }
 
-TEST_P(EachModality, ATeacherTeachesAsOnTheHost) {
+TEST_P(EachModality, TrainingWithATeacherMatchesTheHost) {
   for (const std::string reads : {"vector", "perspective"}) {
     train(options(reads, "cpu", {"policy.modality=" + reads, "run.seed=5", "train.updates=1"}));
     std::vector<std::string> more = one_update();
@@ -167,7 +167,7 @@ TEST_P(EachModality, ATeacherTeachesAsOnTheHost) {
   }
 }
 
-TEST_P(EachModality, EvaluationAgreesWithTheHosts) {
+TEST_P(EachModality, EvaluationMatchesTheHosts) {
   EvaluateOptions o = test::one_scenario(
       train(options("run", "cpu", {modality(), "train.precision=fp32", "train.updates=1"})).checkpoint, 20);
   o.densities = {Density::light, Density::medium};
@@ -198,7 +198,7 @@ TEST_P(EachModality, EvaluationAgreesWithTheHosts) {
 }
 
 // If a rounding error decides an action, states differ from then on: few cases may differ from the host's.
-TEST_F(DeviceTraining, RemovalAgreesWithTheHosts) {
+TEST_F(DeviceTraining, RemovalMatchesTheHosts) {
   RemovalOptions o;
   for (const char* modality : {"perspective", "vector"}) {
     const std::vector<std::string> more{fmt::format("policy.modality={}", modality), "train.precision=fp32",
@@ -242,7 +242,7 @@ TEST_F(DeviceTraining, RemovalAgreesWithTheHosts) {
 
 // The lane keeper drives identically on both, so that policies take over in the same states, bit for bit. From there a
 // rounding error may decide an action.
-TEST_F(DeviceTraining, TakeoversAtCornersBeginAsTheHosts) {
+TEST_F(DeviceTraining, TakeoversAtCornersStartAsOnTheHost) {
   CornerOptions o;
   for (const char* modality : {"perspective", "vector"}) {
     const std::vector<std::string> more{fmt::format("policy.modality={}", modality), "train.precision=fp32",
@@ -341,14 +341,14 @@ TEST_F(MuonOnADevice, GraphsGiveTheSameBits) {
   EXPECT_GT(calls.abs().max().item<float>(), 0.01);
 }
 
-TEST_P(EachModality, ARunWithMuonGoesOnExactly) {
+TEST_P(EachModality, ARunWithMuonResumesExactly) {
   const auto [whole, again, resumed] = test::policies_of_equal_runs(
       folder_ / "muon", "cuda", {modality(), "train.optimizer=muon", "train.reproducible=true"});
   EXPECT_EQ(again, whole);
   EXPECT_EQ(resumed, whole);
 }
 
-TEST_P(EachModality, WhatOneDeviceSavesTheOtherGoesOnFrom) {
+TEST_P(EachModality, HostAndDeviceResumeEachOthersRuns) {
   for (const auto& [first, second] : {std::pair{"cuda", "cpu"}, {"cpu", "cuda"}}) {
     const std::string run = std::string("from_") + first;
     SCOPED_TRACE(run);
@@ -392,7 +392,7 @@ TEST_P(EachModality, WhatOneDeviceSavesTheOtherGoesOnFrom) {
 }
 
 // Gradients are summed in an order that changes from run to run.
-TEST_F(DeviceTraining, KeptAndRedrawnImagesTeachTheSame) {
+TEST_F(DeviceTraining, KeptAndRedrawnImagesTrainEqualPolicies) {
   const std::vector<std::string> more{"train.precision=fp32", "train.updates=1"};
   for (const char* images : {"kept", "redrawn"}) {
     TrainOptions o = options(images, "cuda", more);
@@ -402,7 +402,7 @@ TEST_F(DeviceTraining, KeptAndRedrawnImagesTeachTheSame) {
   expect_same_first_update(folder_ / "kept", folder_ / "redrawn", 1e-9, 1e-3);
 }
 
-TEST_F(DeviceTraining, WhatARolloutKeepsIsWhatItKeepsOnTheHost) {
+TEST_F(DeviceTraining, ARolloutKeepsTheSameImagesAsOnTheHost) {
   constexpr int kSlots = 24;
   constexpr int64_t kSteps = 4;
   struct Kept {
@@ -461,7 +461,7 @@ TEST_F(DeviceTraining, WhatARolloutKeepsIsWhatItKeepsOnTheHost) {
 }
 
 // The renderer writes the patches, graphs are captured again, and the learner's first probabilities are the rollout's.
-TEST_F(DeviceTraining, GoesOnInLargerPatches) {
+TEST_F(DeviceTraining, ContinuesWithLargerPatches) {
   TrainOptions o =
       options("run", "cuda",
               {"policy.patch_px=4", "policy.conv_kernels=[1, 3]", "policy.conv_strides=[1, 1]", "train.precision=bf16",
@@ -477,7 +477,7 @@ TEST_F(DeviceTraining, GoesOnInLargerPatches) {
   EXPECT_EQ(saved.update, 8);
 }
 
-TEST_F(DeviceTraining, EndsWhenItsMinutesAreOverAndGoesOn) {
+TEST_F(DeviceTraining, StopsAtItsTimeLimitAndResumes) {
   TrainOptions o = options("run", "cuda", {"train.updates=2"});
   o.minutes = 1e-9;
   bool has_begun = false;
@@ -498,12 +498,12 @@ TEST_F(DeviceTraining, EndsWhenItsMinutesAreOverAndGoesOn) {
   EXPECT_EQ(Progress(folder_ / "run/progress.csv").num_updates(), 2u);
 }
 
-TEST_F(DeviceTraining, TheAverageOfWeightsIsByHandAndResumesExactly) {
+TEST_F(DeviceTraining, TheAverageOfWeightsMatchesTheDefinitionAndResumesExactly) {
   test::check_average_by_hand(folder_.path(), "cuda");
   test::check_average_resumes_exactly(folder_.path(), "cuda");
 }
 
-TEST_F(DeviceTraining, ARunThatDivergesStopsAndKeepsTheMinibatch) {
+TEST_F(DeviceTraining, ADivergingRunStopsAndKeepsTheMinibatch) {
   const std::string run = folder_ / "run";
   EXPECT_THAT(
       message_of([&] { train(options("run", "cuda", {"policy.modality=vector", "train.learning_rate=100"})); }),
@@ -534,7 +534,7 @@ TEST_F(DeviceTraining, AWorldOfOneRankComputesThroughNccl) {
   EXPECT_THAT(message_of([&] { communicator->sum(at::zeros({2}, at::kHalf)); }), HasSubstr("f64"));
 }
 
-TEST_F(DeviceTraining, AutoIsTheDeviceAndOneThatThereIsNotIsRefusedByName) {
+TEST_F(DeviceTraining, AutoSelectsTheDeviceAndErrorsNameAbsentDevices) {
   const TrainReport report = train(options("auto", "auto", {"train.updates=1"}));
   EXPECT_EQ(report.device, "cuda:0");
   EXPECT_EQ(report.simulator, "cuda");

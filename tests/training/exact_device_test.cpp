@@ -20,7 +20,7 @@ class DeviceExact : public test::DeviceTest {
   ~DeviceExact() override { set_reproducible(false); }
 };
 
-TEST_F(DeviceExact, ThreeUpdatesAreTheHosts) {
+TEST_F(DeviceExact, ThreeUpdatesMatchTheHosts) {
   const ExactRun host = run_exactly(exact_config("cpu", {"run.num_threads=4"}));
   for (const char* images : {"redrawn", "kept"}) {
     SCOPED_TRACE(images);
@@ -32,7 +32,7 @@ TEST_F(DeviceExact, ThreeUpdatesAreTheHosts) {
   }
 }
 
-TEST_F(DeviceExact, GraphsDriveAsCallsDo) {
+TEST_F(DeviceExact, GraphsAndCallsDriveIdentically) {
   const ExactRun calls = run_exactly(exact_config("cuda", {"train.graphs=off"}));
   for (const char* images : {"redrawn", "kept"}) {
     SCOPED_TRACE(images);
@@ -98,7 +98,7 @@ INSTANTIATE_TEST_SUITE_P(All, DeviceGraphs,
                            return std::string(std::get<0>(pair.param)) + "_" + std::get<1>(pair.param);
                          });
 
-TEST_P(DeviceGraphs, TeachWhatCallsTeachToTheBit) {
+TEST_P(DeviceGraphs, TrainBitwiseIdenticallyToCalls) {
   const auto [modality, precision] = GetParam();
   const std::vector<std::string> more{std::string("policy.modality=") + modality,
                                       std::string("train.precision=") + precision};
@@ -120,7 +120,7 @@ TEST_P(DeviceGraphs, TeachWhatCallsTeachToTheBit) {
   EXPECT_NE(calls.policies[5], calls.policies[0]);
 }
 
-TEST_F(DeviceExact, GraphsTeachAsCallsDoWithATeacherAndAfterIt) {
+TEST_F(DeviceExact, GraphsAndCallsTrainIdenticallyWithAndAfterATeacher) {
   const test::ScratchFolder folder;
   const std::string teacher = folder / "teacher.safetensors";
   const Config config = load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", {"policy.modality=vector", "run.seed=5"});
@@ -138,7 +138,7 @@ TEST_F(DeviceExact, GraphsTeachAsCallsDoWithATeacherAndAfterIt) {
   EXPECT_GT(graphs.improving.back(), 3 * 4);
 }
 
-TEST_P(DeviceGraphs, TakeNoMemoryOnceAllSizesHaveCome) {
+TEST_P(DeviceGraphs, AllocateNothingAfterAllSizesWereCaptured) {
   const auto [modality, precision] = GetParam();
   const Learnt graphs = learn({std::string("policy.modality=") + modality, std::string("train.precision=") + precision,
                                "simulator.reset_inactive_fraction=2", "simulator.episode_steps=1000"});
@@ -146,7 +146,7 @@ TEST_P(DeviceGraphs, TakeNoMemoryOnceAllSizesHaveCome) {
   EXPECT_EQ(graphs.allocations.back(), 0);
 }
 
-TEST_F(DeviceExact, WhatCannotBeCapturedIsAnErrorThatNamesTheKey) {
+TEST_F(DeviceExact, CaptureErrorsNameTheKey) {
   const Config config = exact_config("cuda", {});
   const Device device = open_learning_device(config);
   const OwnStream stream(device);

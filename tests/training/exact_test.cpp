@@ -37,7 +37,7 @@ int64_t sum_of(const ExactRun& run, const std::string& name) {
   return sum;
 }
 
-TEST_F(Exact, TheRunHoldsAllThatCanHappenToATransition) {
+TEST_F(Exact, TheRunIncludesAllEventsOfTransitions) {
   const SimulatorTotals& totals = once().totals;
   EXPECT_GT(totals.episodes, 0) << "worlds are reset";
   EXPECT_GT(totals.at_fault_collisions, 0);
@@ -63,13 +63,13 @@ TEST_F(Exact, TheRunHoldsAllThatCanHappenToATransition) {
   for (const float of_one : {0.0f, -0.693147182f, -1.38629436f, -2.07944155f}) EXPECT_GT(log_probs[of_one], 100);
 }
 
-TEST_F(Exact, ImagesDrawnAgainByMoreThreadsAreThoseThatWereKept) {
+TEST_F(Exact, ImagesRedrawnByMoreThreadsEqualKeptImages) {
   const ExactRun redrawn = run_exactly(exact_config("cpu", {"run.num_threads=3", "train.images=redrawn"}));
   test::expect_same_driving(once(), redrawn);
   test::expect_same_order(once(), redrawn);
 }
 
-TEST_F(Exact, TwoRunsOfOneSeedAreTheSame) {
+TEST_F(Exact, TwoRunsOfOneSeedAreEqual) {
   const auto run = [](const char* seed, const char* threads) {
     return run_exactly(exact_config("cpu", {"policy.modality=vector", seed, threads}));
   };

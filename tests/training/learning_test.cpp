@@ -51,7 +51,7 @@ Spread spread_of(const std::array<Curve, kNumSeeds>& curves, size_t window) {
   return spread;
 }
 
-TEST(Learning, EachPrecisionLearnsAndTheSeedMattersMore) {
+TEST(Learning, EachPrecisionLearnsWithinTheSpreadOfSeeds) {
   at::set_num_threads(1);
   const std::array precisions{Precision::fp32, Precision::tf32, Precision::bf16};
   std::array<std::array<Curve, kNumSeeds>, precisions.size()> curves;

@@ -46,7 +46,7 @@ INSTANTIATE_TEST_SUITE_P(Memory, EachRollout,
                                            std::pair{"perspective", "redrawn"}),
                          [](const auto& test) { return std::string(test.param.first) + "_" + test.param.second; });
 
-TEST_P(EachRollout, TakesAboutWhatIsEstimated) {
+TEST_P(EachRollout, UsesAboutTheEstimatedMemory) {
   const auto config = [](int num_slots) { return config_of(GetParam().first, GetParam().second, num_slots); };
   const Config few = config(1000), many = config(3000);
   const bool keeps = std::string(GetParam().second) != "redrawn";
@@ -67,7 +67,7 @@ TEST(Memory, ReplayedTracksOfScenesAreCounted) {
   EXPECT_GT(estimated_bytes(config, true), in_towns);
 }
 
-TEST(Memory, MoreAgentsThanFitAreRefusedWithTheNumberThatWould) {
+TEST(Memory, ErrorsNameTheNumberOfAgentsThatFit) {
   const auto config = [](int num_slots) { return config_of("perspective", "kept", num_slots); };
   const Config any = config(250);
   const double network = network_size(any, Device{}).bytes(static_cast<double>(any.train.forward_chunk));
@@ -104,7 +104,7 @@ INSTANTIATE_TEST_SUITE_P(
         std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=1",
                                  "policy.conv_kernels=[5, 3, 3, 3, 3]", "policy.conv_strides=[2, 2, 2, 1, 1]"}));
 
-TEST_P(EachNetwork, HasTheParametersThatAreCounted) {
+TEST_P(EachNetwork, HasTheCountedParameters) {
   const Config config = config_of_chunk(64);
   EXPECT_EQ(network_size(config, Device{}).parameters, make_policy(config, rig_of(config), Device{})->num_parameters());
 }
@@ -151,7 +151,7 @@ class CountedTensors final : public c10::Allocator {
   c10::Allocator* before_;
 };
 
-TEST_P(EachNetwork, TakesAboutWhatIsEstimatedOnTheWayForwardAndBack) {
+TEST_P(EachNetwork, ForwardAndBackwardUseAboutTheEstimatedMemory) {
   at::set_num_threads(1);  // the peak of several threads depends on their timing
   double taken[2];
   const int chunks[] = {256, 1024};  // sizes at which weights and gradients are small beside the counted memory
@@ -182,7 +182,7 @@ TEST_P(EachNetwork, TakesAboutWhatIsEstimatedOnTheWayForwardAndBack) {
   EXPECT_LT(by_estimate, 1.6 * of_transition) << of_transition << " bytes";
 }
 
-TEST(Memory, ImagesAreKeptOnADeviceWhereTheyTakeTwoFifthsOfItsMemory) {
+TEST(Memory, ImagesAreKeptOnADeviceUpToTwoFifthsOfItsMemory) {
   const auto keeps = [](const std::vector<std::string>& overrides, int64_t memory_bytes,
                         Device device = {MemorySpace::cuda}) {
     return keeps_images(load_config(PICTURA_SOURCE_DIR "/configs/paper.toml", overrides), 1000, device, memory_bytes);
@@ -202,7 +202,7 @@ TEST(Memory, ImagesAreKeptOnADeviceWhereTheyTakeTwoFifthsOfItsMemory) {
   EXPECT_TRUE(keeps({"render.schedule=[[1000, 192, 108]]"}, 10 * bytes));
 }
 
-TEST(Memory, MapsTakeLessThanIsEstimatedAndNotMuchLess) {
+TEST(Memory, TheEstimateOfMapsIsATightUpperBound) {
   const std::vector<std::string> names{"procedural:1", "procedural:1#1", "procedural:2:blocks=2x2", "procedural:5",
                                        "city:1"};
   const MapMemory estimate = estimated_map_memory(names);
@@ -217,7 +217,7 @@ TEST(Memory, MapsTakeLessThanIsEstimatedAndNotMuchLess) {
   EXPECT_LT(estimate.device, 3 * device_bytes);
 }
 
-TEST(Memory, MoreMapsThanFitAreRefusedWithTheNumberThatWould) {
+TEST(Memory, ErrorsNameTheNumberOfMapsThatFit) {
   const auto config = [](int copies) {
     return load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml",
                        {"run.device=cpu", "simulator.maps=[\"procedural:1-4\"]", "simulator.num_slots=4000",
@@ -239,7 +239,7 @@ TEST(Memory, MoreMapsThanFitAreRefusedWithTheNumberThatWould) {
       HasSubstr("cpu has"));
 }
 
-TEST(Memory, ANetworkThatCannotFitIsRefusedBeforeItIsMade) {
+TEST(Memory, AnOversizedNetworkIsRefusedBeforeAllocation) {
   const auto complaint = [](const std::vector<std::string>& overrides) {
     const Config config = load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", overrides);
     return message_of([&] { check_memory(config, Device{}, 64'000'000'000); });

@@ -35,7 +35,7 @@ class OpponentsTest : public ::testing::Test {
   const test::ScratchFolder folder_;
 };
 
-TEST_F(OpponentsTest, DriveAsTheyWereTrainedAndTheLearnerTheRest) {
+TEST_F(OpponentsTest, DriveTheirSharesAndTheLearnerTheOthers) {
   const std::string vectors = policy_of("vectors", {"policy.modality=vector", "policy.auxiliary=true",
                                                     "simulator.wall_observations=true"}),
                     images = policy_of("images", {});
@@ -89,7 +89,7 @@ TEST_F(OpponentsTest, DriveAsTheyWereTrainedAndTheLearnerTheRest) {
   EXPECT_NEAR(driven[2] / (5.0 * num_slots), 0.3, 0.15);
 }
 
-TEST_F(OpponentsTest, NothingIsLearntFromThem) {
+TEST_F(OpponentsTest, AreExcludedFromLearning) {
   const std::string vectors = policy_of("vectors", {"policy.modality=vector"}), images = policy_of("images", {});
   for (const char* modality : {"vector", "perspective"}) {
     const auto learn = [&](const std::string& name, const std::vector<std::string>& more) {
@@ -112,7 +112,7 @@ TEST_F(OpponentsTest, NothingIsLearntFromThem) {
   }
 }
 
-TEST_F(OpponentsTest, RunsGoOnExactly) {
+TEST_F(OpponentsTest, RunsResumeExactly) {
   const std::string held = policy_of("held", {"policy.modality=vector", "policy.decision_steps=3"});
   const auto [whole, again, resumed] =
       test::policies_of_equal_runs(folder_.path(), "cpu", {others({held + "=0.5"}), "simulator.others.blind=0.1"});
@@ -121,7 +121,7 @@ TEST_F(OpponentsTest, RunsGoOnExactly) {
   EXPECT_NE(train(test::small_run(folder_ / "alone", "cpu", {"train.updates=2"})).policy_hash, whole);
 }
 
-TEST_F(OpponentsTest, AreRefusedByName) {
+TEST_F(OpponentsTest, ErrorsNameInvalidOpponents) {
   const auto message = [&](const std::vector<std::string>& texts, std::vector<std::string> settings = {}) {
     settings.push_back(others(texts));
     return test::message_of([&] { train(test::small_run(folder_ / "run", "cpu", settings)); });

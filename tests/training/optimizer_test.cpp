@@ -57,7 +57,7 @@ TrainSection muon_config() {
   return train;
 }
 
-TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
+TEST(AdamW, StepsMatchTheDefinition) {
   const PolicyNetwork policy(test::tiny_section(Modality::vector), 1, 3);
   TrainSection train;
   train.weight_decay = 0.1;
@@ -80,7 +80,7 @@ TEST(AdamW, StepsAsLoshchilovAndHutterDefineIt) {
   EXPECT_GT(std::abs(expected - start), 1e-3);
 }
 
-TEST(AdamW, TakesNoFailedStep) {
+TEST(AdamW, AFailedStepChangesNothing) {
   const PolicyNetwork policy(test::tiny_section(Modality::vector), 1, 3);
   const std::string before = policy.hash();
   Optimizer optimizer(policy, TrainSection{});
@@ -107,7 +107,7 @@ TEST(Muon, GivesSingularValuesNearOne) {
   EXPECT_EQ(orthogonalized(at::zeros({2, 3, 4}), at::kFloat).abs().max().item<float>(), 0);
 }
 
-TEST(Muon, StepsAsItsDefinitionSays) {
+TEST(Muon, StepsMatchTheDefinition) {
   at::manual_seed(5);
   constexpr double kRate = 0.01, kDecay = 0.1;
   // Wide, tall, and a convolution's [out, in, height, width]: small matrices are multiplied together, padded and
@@ -140,7 +140,7 @@ TEST(Muon, StepsAsItsDefinitionSays) {
   }
 }
 
-TEST(Muon, ChangesNothingWhereAGradientIsNotFinite) {
+TEST(Muon, ANonFiniteGradientChangesNothing) {
   at::manual_seed(5);
   const at::Tensor weight = leaf(at::randn({3, 5}));
   Muon muon({weight}, at::kFloat, 0.1);
@@ -171,7 +171,7 @@ TEST(Muon, StepsTheWeightsOfHiddenLayers) {
                   "attention.query_norm.weight", "attention.mlp_norm.weight", "actor.weight", "critic.weight"));
 }
 
-TEST(WeightRms, IsOfHiddenLayersAlone) {
+TEST(WeightRms, CoversOnlyHiddenLayers) {
   const std::vector<NamedTensor> parameters{{"backbone.0.weight", at::full({2, 2}, 3.0f)},
                                             {"backbone.0.bias", at::full({2}, 50.0f)},
                                             {"conv.1.weight", at::full({2, 1, 2, 1}, -1.0f)},
@@ -202,7 +202,7 @@ TEST(Muon, LearnsATaskWithDelayedReward) {
   EXPECT_GT(reward, 0.3);
 }
 
-TEST(Muon, ARunGoesOnExactly) {
+TEST(Muon, ResumesExactly) {
   for (const char* modality : {"policy.modality=vector", "policy.modality=perspective"}) {
     const test::ScratchFolder folder;
     const auto [whole, again, resumed] =
@@ -212,7 +212,7 @@ TEST(Muon, ARunGoesOnExactly) {
   }
 }
 
-TEST(Muon, StartsNewMomentsInARunOfAdamW) {
+TEST(Muon, ResumingARunOfAdamWStartsNewMoments) {
   const test::ScratchFolder folder;
   TrainOptions run = test::small_run(folder / "run", "cpu", {"policy.modality=vector", "train.updates=1"});
   train(run);

@@ -124,9 +124,9 @@ void expect_equal_learning(double max_grad_norm) {
   EXPECT_GT(largest_difference(at_whole_rate.logits(), small.logits()), 1e-3);
 }
 
-TEST(PatchSpread, KeepsLogitsAndHowAStepChangesThem) { expect_equal_learning(1e9); }
+TEST(PatchSpread, KeepsLogitsAndTheEffectOfAStep) { expect_equal_learning(1e9); }
 
-TEST(PatchSpread, KeepsHowAClippedStepChangesLogits) { expect_equal_learning(0.1); }
+TEST(PatchSpread, KeepsTheEffectOfAClippedStep) { expect_equal_learning(0.1); }
 
 class ExportedSize : public ::testing::Test {
  protected:
@@ -182,7 +182,7 @@ TEST_F(ExportedSize, SpreadsTheFirstConvolutionOfAFile) {
   EXPECT_TRUE(resized(small.path, "same.safetensors", {16, 9}).rate_factors.empty());
 }
 
-TEST_F(ExportedSize, IsRefusedWhereAPolicyCannotHaveIt) {
+TEST_F(ExportedSize, RefusesUnsupportedSizes) {
   const std::string path = write(config());
   EXPECT_THAT(refusal(path, {40, 27}),
               AllOf(HasSubstr(path), HasSubstr("size: expected an integer multiple of 16x9, got 40x27")));

@@ -87,7 +87,7 @@ TEST(Gae, EqualsThePlainRecursionExactly) {
   }
 }
 
-TEST(Gae, TruncationBootstrapsTerminationDoesNotAndResetsAreMasked) {
+TEST(Gae, BootstrapsTruncationsButNotTerminationsAndMasksResets) {
   // One slot, gamma 0.5, lambda 1. Step 1 ends the episode, step 2 is the reset, step 3 begins the next episode.
   const std::vector<float> rewards{1, 2, 100, 4}, values{10, 20, 40, 80, 160};
   const std::vector<uint8_t> never{0, 0, 0, 0}, end{0, 1, 0, 0}, valid{1, 1, 0, 1};
@@ -134,7 +134,7 @@ TEST(AdvantageFilter, QuantilesLieInTheBinsOfTheCounts) {
   EXPECT_FLOAT_EQ(filter_quantile(counts, 0.3), 2 + 0.2f * 2 / 128) << "a fifth of the one in its bin, 1.2 of 4";
 }
 
-TEST(AdvantageFilter, QuantileIsThatOfTheSortedAdvantages) {
+TEST(AdvantageFilter, QuantileMatchesSortedAdvantages) {
   std::vector<float> advantages;
   RandomStream stream({.seed = 3, .purpose = Purpose::initial_state});
   for (int i = 0; i < 20000; ++i) advantages.push_back(std::exp(stream.uniform(-6, 3)) * (stream.below(2) ? 1 : -1));
@@ -174,7 +174,7 @@ TEST(AdvantageFilter, DropsTheShareOfItsQuantile) {
   EXPECT_THROW(corridor.update(policy, train, 0, &optimizer, &filter), Error);
 }
 
-TEST(LossStats, ARowHoldsWhatTheirNamesSay) {
+TEST(LossStats, ARowStoresEachNamedValue) {
   LossTensors tensors;
   std::map<std::string, double> written;
   LossTensors::visit_losses(tensors, [&written](const char* name, at::Tensor& tensor) {
@@ -212,7 +212,7 @@ TEST(Schedule, FallsToZeroOverItsLastPart) {
   EXPECT_FALSE(schedule_has_ended(train, 1000));
 }
 
-TEST(Schedule, DoublesLogitsInSoManyAgentSteps) {
+TEST(Schedule, DoublesLogitsOverTheConfiguredAgentSteps) {
   TrainSection train;
   EXPECT_EQ(logit_growth(train, 1000), 1);
   train.sharpen_agent_steps = 100;
@@ -220,7 +220,7 @@ TEST(Schedule, DoublesLogitsInSoManyAgentSteps) {
   EXPECT_DOUBLE_EQ(logit_growth(train, 30) * logit_growth(train, 70), 2);
 }
 
-TEST(Schedule, RisesFromATenth) {
+TEST(Schedule, WarmUpStartsAtATenth) {
   TrainSection train;
   train.learning_rate = 2;
   train.schedule = Schedule::constant;
@@ -230,7 +230,7 @@ TEST(Schedule, RisesFromATenth) {
   EXPECT_DOUBLE_EQ(learning_rate_at(train, 10), 2);
 }
 
-TEST(Permutation, TakesEveryElementOnceAndOnlyItsArgumentsDecide) {
+TEST(Permutation, VisitsEveryElementOnceAndDependsOnlyOnItsArguments) {
   for (const int64_t size : {1, 2, 3, 4, 5, 17, 1000, 4096, 70001}) {
     std::vector<int64_t> taken;
     const Permutation permutation(1, 2, 3, size);
@@ -307,7 +307,7 @@ TEST(Ppo, LearnsATaskWithDelayedReward) {
   EXPECT_GT(stats.kept_fraction, 0.0);
 }
 
-TEST(Ppo, ChunksChangeNothingButRounding) {
+TEST(Ppo, ChunksChangeOnlyRounding) {
   at::set_num_threads(1);
   const PolicySection section = test::learning_section();
   const PolicyNetwork whole(section, 1, 7), chunked(section, 1, 7);
@@ -343,7 +343,7 @@ class CountedPolicy final : public Policy {
   const Policy& policy_;
 };
 
-TEST(Ppo, OneOf100TransitionsTellsTheLossesGradientsApart) {
+TEST(Ppo, SparseDiagnosticsMeasureGradientsOfEachLoss) {
   at::set_num_threads(1);
   const PolicyNetwork network(test::learning_section(), 1, 7);
   const CountedPolicy policy(&network);
@@ -371,7 +371,7 @@ TEST(Ppo, OneOf100TransitionsTellsTheLossesGradientsApart) {
   EXPECT_GT(stats.gradient_norms.entropy, 0);
 }
 
-TEST(Ppo, InvalidTransitionsTeachNothing) {
+TEST(Ppo, InvalidTransitionsDoNotAffectLearning) {
   at::set_num_threads(1);
   const PolicySection section = test::learning_section();
   const PolicyNetwork a(section, 1, 7), b(section, 1, 7);
@@ -391,7 +391,7 @@ TEST(Ppo, InvalidTransitionsTeachNothing) {
   EXPECT_EQ(a.hash(), b.hash());
 }
 
-TEST(Ppo, StopsBeforeTheStepOfAMinibatchThatIsNotFinite) {
+TEST(Ppo, StopsBeforeTheStepOfANonFiniteMinibatch) {
   const PolicyNetwork policy(test::learning_section(), 1, 7);
   const std::string before = policy.hash();
   Corridor corridor;
@@ -431,7 +431,7 @@ TEST(Ppo, StopsBeforeTheStepOfAMinibatchThatIsNotFinite) {
 }
 
 // Both rollouts hold log-probabilities that differ from the policy's: the update uses the policy's own.
-TEST(Ppo, LogProbabilitiesThatAreNotTheLearnersAreComputedAgain) {
+TEST(Ppo, DifferingLogProbabilitiesAreRecomputed) {
   at::set_num_threads(1);
   TrainSection train;
   train.minibatch_size = 200;
@@ -488,7 +488,7 @@ TEST(Ppo, NanIsAnError) {
   }
 }
 
-TEST(Ppo, AGradientThatIsNotFiniteIsAnErrorWhereTheLossIs) {
+TEST(Ppo, ANonFiniteGradientIsAnError) {
   const PolicyNetwork policy(test::learning_section(), 1, 7);
   const std::string before = policy.hash();
   Corridor corridor;

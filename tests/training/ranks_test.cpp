@@ -85,13 +85,13 @@ class LaunchVariables : public ::testing::Test {
   void TearDown() override { launch({}); }
 };
 
-TEST_F(LaunchVariables, SayNothingOfOneProcess) {
+TEST_F(LaunchVariables, DefaultToOneProcess) {
   EXPECT_EQ(launch({}).size, 1);
   // A batch script of several tasks is one process; srun starts the others.
   EXPECT_EQ(launch({{"SLURM_PROCID", "0"}, {"SLURM_LOCALID", "0"}}).size, 1);
 }
 
-TEST_F(LaunchVariables, AreThoseOfTorchrunOrPlainOnes) {
+TEST_F(LaunchVariables, SupportTorchrunAndPlainVariables) {
   const Launch plain = launch({{"RANK", "3"}, {"WORLD_SIZE", "8"}});
   EXPECT_EQ(plain.rank, 3);
   EXPECT_EQ(plain.size, 8);
@@ -113,7 +113,7 @@ TEST_F(LaunchVariables, AreThoseOfTorchrunOrPlainOnes) {
   EXPECT_EQ(torchrun.attempt, "2");
 }
 
-TEST_F(LaunchVariables, AreThoseOfSlurm) {
+TEST_F(LaunchVariables, SupportSlurm) {
   const Launch slurm = launch({{"SLURM_PROCID", "5"},
                                {"SLURM_STEP_NUM_TASKS", "8"},
                                {"SLURM_LOCALID", "1"},
@@ -127,7 +127,7 @@ TEST_F(LaunchVariables, AreThoseOfSlurm) {
   EXPECT_EQ(first_slurm_host("one,two[1-2]"), "one");
 }
 
-TEST_F(LaunchVariables, AreRefusedByName) {
+TEST_F(LaunchVariables, ErrorsNameInvalidVariables) {
   const auto refusal = [](const std::map<std::string, std::string>& variables) {
     return message_of([&] { launch(variables); });
   };
@@ -138,20 +138,20 @@ TEST_F(LaunchVariables, AreRefusedByName) {
   EXPECT_THAT(refusal({{"MASTER_PORT", "70000"}}), HasSubstr("MASTER_PORT"));
 }
 
-TEST(RanksMeet, OrReportMissingRanks) {
+TEST(RankRendezvous, ReportsMissingRanks) {
   const int port = free_port();
   EXPECT_THAT(message_of([&] { Ranks ranks(place(0, 3, port), {.join_s = 0.2}); }),
               AllOf(HasSubstr("2 of 3 ranks did not reach"), HasSubstr(std::to_string(port)), HasSubstr("1, 2")));
 }
 
-TEST(RanksMeet, OnlyAtAPortThatIsFree) {
+TEST(RankRendezvous, RefusesAPortInUse) {
   const Listener other;
   EXPECT_THAT(
       message_of([&] { Ranks ranks(place(0, 2, other.port), {.join_s = 1}); }),
       AllOf(HasSubstr("rank 0"), HasSubstr("MASTER_PORT"), HasSubstr(std::to_string(other.port)), HasSubstr("in use")));
 }
 
-TEST(RanksMeet, EachUnderItsOwnNumber) {
+TEST(RankRendezvous, RefusesDuplicateRanks) {
   const std::vector<std::string> errors = run_ranks(2, [](Ranks& ranks) {
     if (ranks.rank() == 0) {
       EXPECT_THAT(message_of([&] { Ranks again(place(1, 2, ranks.launch().port), {.join_s = 1}); }),
@@ -161,7 +161,7 @@ TEST(RanksMeet, EachUnderItsOwnNumber) {
   EXPECT_THAT(errors, ::testing::Each(test::kNoError));
 }
 
-TEST(RanksLoseEachOther, WhenOneFailsForItsReason) {
+TEST(RankFailures, ErrorsGiveTheReasonOfTheFailedRank) {
   const std::vector<std::string> errors = run_ranks(3, [](Ranks& ranks) {
     if (ranks.rank() == 2) {
       ranks.announce("no space left");
@@ -176,7 +176,7 @@ TEST(RanksLoseEachOther, WhenOneFailsForItsReason) {
   for (size_t rank : {0, 1}) EXPECT_EQ(errors[rank], "rank 2 ended: no space left");
 }
 
-TEST(RanksLoseEachOther, WhenOneHangsButNotWhenItWorksForLong) {
+TEST(RankFailures, HangsAreDetectedButLongWorkIsAllowed) {
   const std::vector<std::string> errors = run_ranks(2,
                                                     [](Ranks& ranks) {
                                                       ranks.step();
@@ -198,7 +198,7 @@ TEST(RanksLoseEachOther, WhenOneHangsButNotWhenItWorksForLong) {
   EXPECT_THAT(errors[1], HasSubstr("rank 1: alive"));
 }
 
-TEST(RanksLoseEachOther, NotWhereStepsMayTakeLonger) {
+TEST(RankFailures, SlowStepsWithinTheLimitAreAllowed) {
   const std::vector<std::string> errors = run_ranks(2,
                                                     [](Ranks& ranks) {
                                                       ranks.set_no_progress_s(60);
@@ -324,7 +324,7 @@ TrainSection plain_steps() {
   return train;
 }
 
-TEST(RanksLearn, WithMuonTheSameToTheBit) {
+TEST(RankTraining, GivesBitwiseIdenticalPoliciesWithMuon) {
   TrainSection train = plain_steps();
   train.optimizer = OptimizerKind::muon;
   const std::vector<Learnt> ranks = learn({10, 100, test::Corridor::kSlots}, train);
@@ -332,7 +332,7 @@ TEST(RanksLearn, WithMuonTheSameToTheBit) {
   EXPECT_NE(ranks[0].hashes[0], ranks[0].hashes[2]);
 }
 
-TEST(RanksLearn, ByAQuantileOfAllAdvantages) {
+TEST(RankTraining, FiltersByAQuantileOverAllRanks) {
   TrainSection train = plain_steps();
   train.adv_filter = FilterThreshold::quantile;
   const Learnt one = learn({test::Corridor::kSlots}, train).front();
@@ -347,7 +347,7 @@ TEST(RanksLearn, ByAQuantileOfAllAdvantages) {
   EXPECT_NEAR(one.first.kept_fraction, 0.5, 0.01);
 }
 
-TEST(RanksLearn, WhatOneWouldHaveLearntAndTheSameToTheBit) {
+TEST(RankTraining, MatchesOneRankAndIsBitwiseIdenticalAmongRanks) {
   const TrainSection train = plain_steps();
   const Learnt one = learn({test::Corridor::kSlots}, train).front();
   ASSERT_GT(one.last.minibatches, 6);
@@ -372,7 +372,7 @@ TEST(RanksLearn, WhatOneWouldHaveLearntAndTheSameToTheBit) {
   }
 }
 
-TEST(RanksLearn, FromSlotsThatCountNothingToo) {
+TEST(RankTraining, MatchesOneRankWithHaltedSlotsDrawn) {
   TrainSection train = plain_steps();
   train.adv_filter_threshold = 0;
   train.halted_slots = HaltedSlots::draw;
@@ -385,7 +385,7 @@ TEST(RanksLearn, FromSlotsThatCountNothingToo) {
   }
 }
 
-TEST(RanksLearn, AndNoticeWhenTheirPoliciesDifferByABit) {
+TEST(RankTraining, DetectsDifferingPolicies) {
   const Config config =
       load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml",
                   {"run.device=cpu", "run.num_threads=1", "policy.modality=vector", "train.num_steps=2",
@@ -402,7 +402,7 @@ TEST(RanksLearn, AndNoticeWhenTheirPoliciesDifferByABit) {
   EXPECT_THAT(errors, ::testing::Each(test::kNoError));
 }
 
-TEST(RanksLearn, AndStopTogetherWhenOneMeetsNaN) {
+TEST(RankTraining, StopsAllRanksOnNaN) {
   const std::vector<std::string> errors = run_ranks(2, [&](Ranks& ranks) {
     const std::unique_ptr<Communicator> communicator = make_communicator(&ranks, Device{});
     const TrainSection train = plain_steps();

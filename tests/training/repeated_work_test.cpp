@@ -11,7 +11,7 @@ using Mode = RepeatedWork::Mode;
 using test::message_of;
 using ::testing::HasSubstr;
 
-TEST(RepeatedWork, IsDoneByCallsOnceAfterItsMemoryIsSettledAndThenCaptured) {
+TEST(RepeatedWork, RunsAsCallsUntilMemoryIsStableAndIsThenCaptured) {
   const Graphs graphs(Device{}, /*are_used=*/true);
   RepeatedWork work;
   for (int i = 0; i < 3; ++i) EXPECT_EQ(work.next_mode(graphs, /*is_settled=*/false), Mode::calls);
@@ -21,7 +21,7 @@ TEST(RepeatedWork, IsDoneByCallsOnceAfterItsMemoryIsSettledAndThenCaptured) {
   EXPECT_FALSE(work.is_captured());
 }
 
-TEST(RepeatedWork, IsAlwaysDoneByCallsWithoutGraphs) {
+TEST(RepeatedWork, RunsAsCallsWithoutGraphs) {
   Graphs graphs(Device{}, /*are_used=*/false);
   RepeatedWork work;
   int times = 0;
@@ -30,7 +30,7 @@ TEST(RepeatedWork, IsAlwaysDoneByCallsWithoutGraphs) {
   EXPECT_EQ(graphs.num_launches(), 0);
 }
 
-TEST(RepeatedWork, ThatCannotBeCapturedIsAnErrorThatNamesTheKey) {
+TEST(RepeatedWork, CaptureErrorsNameTheKey) {
   Graphs graphs(Device{}, /*are_used=*/true);
   RepeatedWork work;
   int times = 0;

@@ -32,7 +32,7 @@ INSTANTIATE_TEST_SUITE_P(Reproducible, EachModality, ::testing::Values("vector",
 
 // On the host, which has only fp32, each setting gives one policy. train.reproducible may give another policy: it pads
 // chunks, and the rounding of a product may depend on its number of rows.
-TEST_P(EachModality, TheHostGivesOnePolicyInEachSetting) {
+TEST_P(EachModality, HostRunsGiveEqualPoliciesInEachSetting) {
   const auto policies = [this](const std::string& precision, const std::string& reproducible) {
     return test::policies_of_equal_runs(folder_ / (precision + reproducible), "cpu",
                                         {std::string("policy.modality=") + GetParam(), "train.precision=" + precision,
@@ -48,14 +48,14 @@ TEST_P(EachModality, TheHostGivesOnePolicyInEachSetting) {
 }
 
 // Convolutions of few channels use oneDNN, others our own products, whose sums are per thread.
-TEST_F(Reproducible, TheHostGivesOnePolicyWithWideConvolutionsAndTwoThreads) {
+TEST_F(Reproducible, HostRunsGiveEqualPoliciesWithWideConvolutionsAndTwoThreads) {
   const auto [whole, again, resumed] = test::policies_of_equal_runs(
       folder_ / "wide", "cpu", {"policy.conv_channels=[16, 24]", "run.num_threads=2", "train.num_steps=6"});
   EXPECT_EQ(whole, again);
   EXPECT_EQ(whole, resumed);
 }
 
-TEST_F(Reproducible, MeansDeterministicAlgorithmsAndNoAutotuner) {
+TEST_F(Reproducible, SelectsDeterministicAlgorithmsAndDisablesTheAutotuner) {
   const at::Context& torch = at::globalContext();
   set_reproducible(true);
   EXPECT_TRUE(torch.deterministicAlgorithms());
@@ -77,7 +77,7 @@ TEST_F(Reproducible, MeansDeterministicAlgorithmsAndNoAutotuner) {
   EXPECT_FALSE(torch.benchmarkCuDNN());
 }
 
-TEST_F(Reproducible, AWorkspaceOfCublasThatIsNotIsRefused) {
+TEST_F(Reproducible, ANondeterministicCublasWorkspaceIsRefused) {
   setenv("CUBLAS_WORKSPACE_CONFIG", ":0:0", 1);
   EXPECT_THAT(message_of([] { set_reproducible(true); }),
               AllOf(HasSubstr("train.reproducible"), HasSubstr("CUBLAS_WORKSPACE_CONFIG"), HasSubstr("got \":0:0\"")));
@@ -86,7 +86,7 @@ TEST_F(Reproducible, AWorkspaceOfCublasThatIsNotIsRefused) {
   EXPECT_STREQ(std::getenv("CUBLAS_WORKSPACE_CONFIG"), ":16:8");
 }
 
-TEST_F(Reproducible, MayChangeWhenARunGoesOnAndIsSaid) {
+TEST_F(Reproducible, MayChangeOnResumeWithANotice) {
   TrainOptions run = test::small_run(folder_ / "run", "cpu", {"policy.modality=vector", "train.updates=1"});
   train(run);
   run.old_run = OldRun::resume;

@@ -59,7 +59,7 @@ class RunWithEvaluations : public ::testing::Test {
   test::ScratchFolder folder_;
 };
 
-TEST_F(RunWithEvaluations, LearnsTheSameAndMeasuresWhatEvaluateMeasures) {
+TEST_F(RunWithEvaluations, LearnsIdenticallyAndMatchesTheEvaluateCommand) {
   const TrainReport without = train(options("without", {})), with = train(evaluating("with", 2));
   EXPECT_EQ(with.policy_hash, without.policy_hash);
   EXPECT_EQ(with.agent_steps, without.agent_steps);
@@ -76,7 +76,7 @@ TEST_F(RunWithEvaluations, LearnsTheSameAndMeasuresWhatEvaluateMeasures) {
   expect_last_row_as_evaluate_measures("with", with.checkpoint);
 }
 
-TEST_F(RunWithEvaluations, WithCopiesOfMapsAreOnTheMapsAlone) {
+TEST_F(RunWithEvaluations, EvaluatesOnlyOriginalMapsNotCopies) {
   TrainOptions plain = evaluating("plain", 4), copied = evaluating("copied", 4);
   for (TrainOptions* one : {&plain, &copied}) {
     one->overrides.insert(one->overrides.end(), {"simulator.min_agents=4", "simulator.max_agents=4", "run.seed=2"});
@@ -95,7 +95,7 @@ TEST_F(RunWithEvaluations, WithCopiesOfMapsAreOnTheMapsAlone) {
   EXPECT_EQ(train(parts).policy_hash, with.policy_hash);
 }
 
-TEST_F(RunWithEvaluations, MeasureCamerasAsMountedWhateverTrainingHas) {
+TEST_F(RunWithEvaluations, EvaluatesWithoutCameraRandomization) {
   TrainOptions shaken = evaluating("shaken", 2, 2), plain = evaluating("plain", 2, 2);
   shaken.overrides.insert(shaken.overrides.end(),
                           {"render.randomization.rotation_deg=6", "render.randomization.noise_share=0.2"});
@@ -104,7 +104,7 @@ TEST_F(RunWithEvaluations, MeasureCamerasAsMountedWhateverTrainingHas) {
   expect_last_row_as_evaluate_measures("shaken", report.checkpoint);
 }
 
-TEST_F(RunWithEvaluations, GoesOnWithTornAndMissingRows) {
+TEST_F(RunWithEvaluations, ResumesWithTornAndMissingRows) {
   const TrainReport whole = train(evaluating("whole", 1));
   train(evaluating("parts", 1, 2));
   // The run was killed after the checkpoint and before the following evaluation; the file has a row of an update that
@@ -123,7 +123,7 @@ TEST_F(RunWithEvaluations, GoesOnWithTornAndMissingRows) {
   }
 }
 
-TEST_F(RunWithEvaluations, IsOutOfTimeBeforeAnEvaluationThatWouldNotEndAndMakesItLater) {
+TEST_F(RunWithEvaluations, DefersAnEvaluationBeyondTheTimeLimit) {
   const TrainReport first = train(evaluating("run", 2, 1));
   Checkpoint saved = read_checkpoint(first.checkpoint);
   saved.longest_update_s["host, 8 agents, evaluation"] = 3600;
@@ -151,7 +151,7 @@ class RunWithImageSizes : public RunWithEvaluations {
   std::vector<std::string> notices_;
 };
 
-TEST_F(RunWithImageSizes, ChangesThemBetweenUpdatesAndGoesOnExactly) {
+TEST_F(RunWithImageSizes, ChangesSizesBetweenUpdatesAndResumesExactly) {
   const TrainReport whole = train(scheduled("whole", "[[100, 20, 12], [100000, 40, 20]]", 4));
   const Table progress = read_table(folder_ / "whole/progress.csv"), evaluated = read_table(evaluations("whole"));
   const std::vector<std::string> agent_steps = column(progress, "charts/agent_steps"),
@@ -185,7 +185,7 @@ TEST_F(RunWithImageSizes, ChangesThemBetweenUpdatesAndGoesOnExactly) {
   EXPECT_NE(train(options("small", {})).policy_hash, whole.policy_hash);
 }
 
-TEST_F(RunWithImageSizes, SpreadsTheFirstConvolutionAndGoesOnExactly) {
+TEST_F(RunWithImageSizes, SpreadsTheFirstConvolutionAndResumesExactly) {
   const std::string schedule = "[[100, 32, 18, 2, 0.7]]";
   const TrainReport whole = train(scheduled("whole", schedule, 4));
   ASSERT_EQ(notices_.size(), 1u);
@@ -226,7 +226,7 @@ TEST_F(RunWithImageSizes, SpreadsTheFirstConvolutionAndGoesOnExactly) {
   EXPECT_EQ(read_checkpoint(train(next).checkpoint).rate_factors, saved.rate_factors);
 }
 
-TEST_F(RunWithImageSizes, MayChangeTheirFutureOnResumeButNotTheirPast) {
+TEST_F(RunWithImageSizes, AllowsFutureScheduleChangesButNotPastOnesOnResume) {
   train(scheduled("run", "[]", 2));
   TrainOptions rest = scheduled("run", "[[100, 20, 12]]", 4);
   rest.old_run = OldRun::resume;
@@ -239,7 +239,7 @@ TEST_F(RunWithImageSizes, MayChangeTheirFutureOnResumeButNotTheirPast) {
   EXPECT_THAT(notices_[1], HasSubstr("images are 20x12 instead of 16x9"));
 }
 
-TEST_F(RunWithImageSizes, BeginsWithWeightsOfOtherCamerasOfTheSameNumber) {
+TEST_F(RunWithImageSizes, StartsWithWeightsOfOtherCamerasOfEqualNumber) {
   const std::string first = train(options("first", {"train.updates=1"})).checkpoint;
   std::string config;
   std::istringstream lines(read_file(PICTURA_SOURCE_DIR "/configs/smoke.toml"));

@@ -40,7 +40,7 @@ class ProgressCsvFile : public ::testing::Test {
   std::vector<std::string> notices_;
 };
 
-TEST_F(ProgressCsvFile, KeepsWholeRowsOfUpdatesThatAreDone) {
+TEST_F(ProgressCsvFile, KeepsCompleteRowsOfFinishedUpdates) {
   const std::string rows = "update,a,b\n1,2,3\n2,nan,-5e-3\n";
   const std::string whole = rows + "9,0.5,7\n";
   EXPECT_EQ(after("", 2), "update,a,b\n9,0.5,7\n");
@@ -67,7 +67,7 @@ TEST_F(ProgressCsvFile, KeepsItsRowsUnderALocaleOfDecimalCommas) {
   EXPECT_EQ(written, rows + "9,0.5,7\n");
 }
 
-TEST_F(ProgressCsvFile, OtherColumnsGoOnInANewFile) {
+TEST_F(ProgressCsvFile, DifferentColumnsStartANewFile) {
   const std::string old = "update,a\n1,2\n", older = "update,z,b\n1,2,3\n";
   EXPECT_EQ(after(old, 1), "update,a,b\n9,0.5,7\n");
   EXPECT_EQ(read_file(path_ + ".1"), old);
@@ -90,7 +90,7 @@ double logged(const std::string& folder, const std::string& name) {
   return std::stod(table.back().at(static_cast<size_t>(column)));
 }
 
-TEST_F(LoggedRun, LogsReturnByTermAndWhenAgentsBeganToMove) {
+TEST_F(LoggedRun, LogsReturnsByTermAndTimesOfFirstMoves) {
   // Episodes as long as the rollout, so that all end in it.
   const TrainReport report =
       train(test::small_run(folder_ / "run", "cpu", {"train.updates=1", "simulator.episode_steps=12"}));
@@ -153,7 +153,7 @@ TEST_F(LoggedRun, TheProgressLineShowsRateTimeLeftMetricsAndPhases) {
   EXPECT_THAT(progress_text(seen[2]), HasSubstr("ETA at most "));
 }
 
-TEST_F(ProgressCsvFile, TheFirstUpdateWithOtherLogProbabilitiesThanTheLearnersIsSaid) {
+TEST_F(ProgressCsvFile, ReportsTheFirstUpdateWithDifferingLogProbabilities) {
   RunLog log(folder_.path(), Config{}, 0, 0, {}, [this](const std::string& text) { notices_.push_back(text); });
   UpdateRecord record;
   for (const bool is_rejected : {false, true, true, false}) {
@@ -193,7 +193,7 @@ class FullDisk {
 
 using FullDisks = ProgressCsvFile;
 
-TEST_F(FullDisks, AreErrorsOfTheCsvAndOfEventsThatNameFileAndReason) {
+TEST_F(FullDisks, ErrorsOfCsvAndEventsNameFileAndReason) {
   const auto fill = [](const auto& write) {
     const FullDisk full(2000);
     return message_of([&] {

@@ -66,7 +66,7 @@ class SceneSetsTest : public ::testing::Test {
   test::ScratchFolder folder_;
 };
 
-TEST_F(SceneSetsTest, RolesStartsAndGoalsAreThoseOfEvaluations) {
+TEST_F(SceneSetsTest, RolesStartsAndGoalsEqualThoseOfEvaluations) {
   write(1, {.num_vehicles = 14});
   for (const char* name : {"gpudrive", "womd", "waymax"}) {
     SCOPED_TRACE(name);
@@ -133,7 +133,7 @@ TEST_F(SceneSetsTest, ChosenRoadUsersDriveAndTheOthersAreReplayed) {
   EXPECT_EQ(driven({"simulator.scenes.rules=[\"least_way_m=1000\"]"}), 0);
 }
 
-TEST_F(SceneSetsTest, ScenesTakeTurnsAndUnusableOnesAreReplaced) {
+TEST_F(SceneSetsTest, ScenesAlternateAndUnusableOnesAreReplaced) {
   write(1);
   write(2, {}, /*has_drivers=*/false);
   write(3);
@@ -186,7 +186,7 @@ TEST_F(SceneSetsTest, RunsTrainAndResumeExactlyAcrossSets) {
   EXPECT_EQ(evaluate_scenes(options).results.scored(), 3);
 }
 
-TEST_F(SceneSetsTest, PerspectivePoliciesTrainInThem) {
+TEST_F(SceneSetsTest, PerspectivePoliciesTrainInSceneSets) {
   for (int number = 1; number <= 3; ++number) write(number);
   const test::ScratchFolder runs;
   const TrainReport report = train(test::small_run(runs / "a", "cpu",

@@ -39,7 +39,7 @@ TEST(Teacher, LossIsTheWeightedDivergenceFromItsActions) {
   EXPECT_LT((logits.grad() - 0.25 * (q - p) / 2).abs().max().item<double>(), 1e-12);
 }
 
-TEST(Teacher, WeightFallsAlongALine) {
+TEST(Teacher, WeightDecreasesLinearly) {
   TrainSection train;
   EXPECT_EQ(teacher_weight_at(train, 0), 0);
   train.teacher = "teacher.safetensors";
@@ -77,7 +77,7 @@ class TeacherTest : public ::testing::Test {
   const test::ScratchFolder folder_;
 };
 
-TEST_F(TeacherTest, APolicyOfImagesComesToActAsItDoes) {
+TEST_F(TeacherTest, AnImagePolicyLearnsTheTeachersActions) {
   const std::string teacher = vector_policy("teacher", {"policy.auxiliary=true", "simulator.wall_observations=true"});
   const std::vector<std::string> settings{"train.teacher=" + teacher, "train.teacher_coef=5", "train.updates=30",
                                           "train.learning_rate=3e-3", "train.warm_up_agent_steps=0"};
@@ -87,7 +87,7 @@ TEST_F(TeacherTest, APolicyOfImagesComesToActAsItDoes) {
   EXPECT_LT(with.back(), 0.5 * with.front());
 }
 
-TEST_F(TeacherTest, TeachesByItsOwnImages) {
+TEST_F(TeacherTest, AnImageTeacherUsesItsOwnImages) {
   // The learner's images are larger and its cameras are randomized; the teacher draws as in its training.
   const std::string teacher = policy_of("teacher", {"train.sharpen_agent_steps=8"});
   for (const std::string modality : {"perspective", "vector"}) {
@@ -105,7 +105,7 @@ TEST_F(TeacherTest, TeachesByItsOwnImages) {
   }
 }
 
-TEST_F(TeacherTest, OneThatWeighsNothingChangesNoBit) {
+TEST_F(TeacherTest, AZeroWeightChangesNothing) {
   const std::string teacher = vector_policy("teacher");
   const std::vector<std::string> plain{"train.updates=2"},
       none{"train.updates=2", "train.teacher=" + teacher, "train.teacher_coef=0"};
@@ -114,7 +114,7 @@ TEST_F(TeacherTest, OneThatWeighsNothingChangesNoBit) {
   EXPECT_THAT(divergences(folder_ / "none"), ::testing::Each(0));
 }
 
-TEST_F(TeacherTest, RunsGoOnExactly) {
+TEST_F(TeacherTest, RunsResumeExactly) {
   const std::string alone = train(small_run(folder_ / "alone", "cpu", {"train.updates=2"})).policy_hash;
   for (const std::string& teacher : {vector_policy("vectors"), policy_of("images", {"train.sharpen_agent_steps=8"})}) {
     const auto [whole, again, resumed] = test::policies_of_equal_runs(
@@ -125,7 +125,7 @@ TEST_F(TeacherTest, RunsGoOnExactly) {
   }
 }
 
-TEST_F(TeacherTest, RunsThatHoldActionsGoOnExactly) {
+TEST_F(TeacherTest, RunsWithHeldActionsResumeExactly) {
   const std::string teacher = vector_policy("teacher");
   const std::vector<std::string> held{"train.teacher=" + teacher, "train.teacher_agent_steps=300",
                                       "policy.decision_steps=3"};
@@ -138,7 +138,7 @@ TEST_F(TeacherTest, RunsThatHoldActionsGoOnExactly) {
   EXPECT_THAT(divergences(folder_ / "whole"), ::testing::Each(::testing::Gt(0)));
 }
 
-TEST_F(TeacherTest, OthersAreRefusedByName) {
+TEST_F(TeacherTest, ErrorsNameIncompatibleTeachers) {
   const auto message = [&](const std::string& teacher, std::vector<std::string> settings = {}) {
     settings.push_back("train.teacher=" + teacher);
     return test::message_of([&] { train(small_run(folder_ / "student", "cpu", settings)); });

@@ -82,7 +82,7 @@ TEST_F(Training, ResumesExactly) {
   }
 }
 
-TEST_F(Training, EndsWhenItsMinutesAreOverAndGoesOnExactly) {
+TEST_F(Training, StopsAtItsTimeLimitAndResumesExactly) {
   const TrainReport half = train(options("parts", {"train.updates=2"}));
   EXPECT_FALSE(half.out_of_time);
   // Out of time before the first remaining update.
@@ -107,7 +107,7 @@ TEST_F(Training, EndsWhenItsMinutesAreOverAndGoesOnExactly) {
   EXPECT_EQ(read_table(folder_ / "parts/progress.csv").size(), 5u);
 }
 
-TEST_F(Training, KnowsBeforeItsFirstUpdateHowLongOneTakesOnThisDeviceWithAsManyAgents) {
+TEST_F(Training, UsesSavedUpdateTimesOfTheSameDeviceAndAgentCount) {
   const TrainReport first = train(options("run", {"train.updates=1"}));
   Checkpoint saved = read_checkpoint(first.checkpoint);
   ASSERT_EQ(saved.longest_update_s.size(), 1u);
@@ -138,7 +138,7 @@ TEST_F(Training, KnowsBeforeItsFirstUpdateHowLongOneTakesOnThisDeviceWithAsManyA
   EXPECT_EQ(measured, elsewhere);
 }
 
-TEST_F(Training, ARunWithoutTimeForItsFirstUpdateIsSavedAndGoesOn) {
+TEST_F(Training, ARunWithoutTimeForItsFirstUpdateIsSavedAndResumes) {
   TrainOptions none = options("run", {"train.updates=1"});
   none.minutes = 1e-9;
   const TrainReport stopped = train(none);
@@ -153,7 +153,7 @@ TEST_F(Training, ARunWithoutTimeForItsFirstUpdateIsSavedAndGoesOn) {
   EXPECT_EQ(train(rest).policy_hash, train(options("whole", {"train.updates=1"})).policy_hash);
 }
 
-TEST_F(Training, NewEpisodesBeginWhereTheSavedOnesCannotGoOn) {
+TEST_F(Training, NewEpisodesReplaceUnreadableSimulatorStates) {
   const TrainReport half = train(options("run", {"train.updates=2"}));
   const Checkpoint saved = read_checkpoint(half.checkpoint);
   const auto resume = [&](std::vector<uint8_t> simulator, const char* updates, std::vector<std::string>* notices) {
@@ -196,7 +196,7 @@ TEST_F(Training, NewEpisodesBeginWhereTheSavedOnesCannotGoOn) {
   EXPECT_TRUE(notices.empty());
 }
 
-TEST_F(Training, RefusesToResumeWithOtherCamerasByName) {
+TEST_F(Training, ResumeErrorsNameOtherCameras) {
   auto write_rig = [&](double yaw_deg) {
     write_file(folder_ / "rig.toml", fmt::format("[[camera]]\nname = \"ahead\"\nwidth_px = 16\nheight_px = 9\n"
                                                  "focal_px = 8\nx_m = 1\nz_m = 1.5\nyaw_deg = {}\n",
@@ -221,7 +221,7 @@ TEST_F(Training, RefusesToResumeWithOtherCamerasByName) {
   EXPECT_EQ(train(o).updates, 2);
 }
 
-TEST_F(Training, ResumesUnderAnotherNameOfTheSameCamerasAndOtherHarmlessSettings) {
+TEST_F(Training, ResumesWithRenamedRigsAndOtherHarmlessSettings) {
   const std::string camera =
       "[[camera]]\nname = \"ahead\"\nwidth_px = 16\nheight_px = 9\nfocal_px = 8\nx_m = 1\nz_m = 1.5\n";
   auto write_config = [&](const std::string& rig) {
@@ -266,7 +266,7 @@ TEST_F(Training, EachRendererWorksWithTheSimulatorOnTheCpu) {
   EXPECT_GT(evaluate(o).rows.at(0).km_driven, 0);
 }
 
-TEST_F(Training, RolloutsThatCannotFitAreRefused) {
+TEST_F(Training, OversizedRolloutsAreRefused) {
   // 65,537 rows of 8,000 observations: about 2.8 TB for vectors, far more for large images.
   const std::vector<std::string> huge = {"train.num_steps=65536", "simulator.num_slots=8000"};
   TrainOptions vector = options("vector", huge);
@@ -278,7 +278,7 @@ TEST_F(Training, RolloutsThatCannotFitAreRefused) {
   EXPECT_THAT(message_of([&] { train(images); }), HasSubstr("simulator.num_slots"));
 }
 
-TEST_F(Training, WhatARolloutKeepsIsWhatTheActiveAgentsSaw) {
+TEST_F(Training, ARolloutKeepsTheObservationsOfActiveAgents) {
   // With randomized cameras, whose images are the same when drawn again.
   const auto config_of = [](std::vector<std::string> more) {
     more.insert(more.end(),
@@ -352,12 +352,12 @@ TEST_F(Training, WhatARolloutKeepsIsWhatTheActiveAgentsSaw) {
   }
 }
 
-TEST_F(Training, KeptAndRedrawnImagesTeachTheSame) {
+TEST_F(Training, KeptAndRedrawnImagesTrainEqualPolicies) {
   const TrainReport kept = train(options("kept", {"train.images=kept"}));
   EXPECT_EQ(train(options("redrawn", {"train.images=redrawn"})).policy_hash, kept.policy_hash);
 }
 
-TEST_F(Training, NothingIsLearntFromHaltedSlotsThatAreDrawn) {
+TEST_F(Training, DrawnHaltedSlotsDoNotAffectLearning) {
   // Only gradients change parameters, by as much.
   const std::vector<std::string> settings = {
       "train.updates=1",  "train.num_steps=60",    "train.adv_filter_threshold=0", "simulator.num_slots=24",
@@ -387,7 +387,7 @@ TEST_F(Training, NothingIsLearntFromHaltedSlotsThatAreDrawn) {
   EXPECT_EQ(in_minibatches.minibatches, (24 * 60 + 63) / 64);
 }
 
-TEST_F(Training, NothingIsLearntFromImpairedAgents) {
+TEST_F(Training, ImpairedAgentsAreExcludedFromLearning) {
   const auto learn = [&](const std::string& name, const std::vector<std::string>& more) {
     TrainOptions o =
         options(name, {"train.updates=1", "train.num_steps=60", "train.adv_filter_threshold=0", "train.update_epochs=1",
@@ -408,7 +408,7 @@ TEST_F(Training, NothingIsLearntFromImpairedAgents) {
   EXPECT_EQ(among.minibatches, (among.agent_steps + 63) / 64);
 }
 
-TEST_F(Training, WithImpairedAgentsGoesOnExactly) {
+TEST_F(Training, ResumesExactlyWithImpairedAgents) {
   const std::vector<std::string> impaired{"simulator.others.blind=0.3", "simulator.others.phantom_braking=0.3"};
   const auto of = [&](const char* name, const char* updates) {
     TrainOptions o = options(name, impaired);
@@ -426,7 +426,7 @@ TEST_F(Training, WithImpairedAgentsGoesOnExactly) {
   EXPECT_THAT(message_of([&] { train(rest); }), HasSubstr("simulator.others.blind"));
 }
 
-TEST_F(Training, AnUpdateSaysWhatItCost) {
+TEST_F(Training, UpdatesReportTheirCost) {
   TrainOptions o = options("run", {"train.updates=2"});
   std::vector<UpdateCost> costs;
   o.on_progress = [&costs](const TrainProgress& progress) { costs.push_back(progress.cost); };
@@ -448,7 +448,7 @@ TEST_F(Training, AnUpdateSaysWhatItCost) {
   EXPECT_EQ(report.device_bytes, 0) << "there is no device";
 }
 
-TEST_F(Training, WritesWhatItPromisesAndStartsFromItsSeed) {
+TEST_F(Training, WritesAllFilesAndStartsFromItsSeed) {
   const TrainReport report = train(options("run", {"train.updates=1"}));
   for (const char* name : {"config.toml", "untrained.ckpt", "checkpoint.ckpt", "policy.safetensors", "progress.csv"}) {
     EXPECT_TRUE(std::filesystem::exists(folder_ / (std::string("run/") + name))) << name;
@@ -463,7 +463,7 @@ TEST_F(Training, WritesWhatItPromisesAndStartsFromItsSeed) {
   EXPECT_NE(other.policy_hash, report.policy_hash);
 }
 
-TEST_F(Training, InterruptedRunSavesAndGoesOnExactly) {
+TEST_F(Training, InterruptedRunSavesAndResumesExactly) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   TrainOptions stopped = options("stopped");
   // The stopped process has its own scratch folder; it writes into the folder of the process that started it.
@@ -486,7 +486,7 @@ TEST_F(Training, InterruptedRunSavesAndGoesOnExactly) {
   EXPECT_EQ(train(rest).policy_hash, train(options("whole")).policy_hash);
 }
 
-TEST_F(Training, ARunInTheFolderIsNeitherOverwrittenNorMixedWithUnlessAskedFor) {
+TEST_F(Training, AnExistingRunIsKeptUnlessOverwriteOrResumeIsSet) {
   const auto entries = [&] {
     std::vector<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(folder_ / "run")) {
@@ -535,7 +535,7 @@ TEST_F(Training, ARunInTheFolderIsNeitherOverwrittenNorMixedWithUnlessAskedFor) 
   EXPECT_EQ(read_file(folder_ / "run/events.out.tfevents.17.host"), "another program's");
 }
 
-TEST_F(Training, NothingIsWrittenWhereLinksInItsFolderLead) {
+TEST_F(Training, TargetsOfLinksInItsFolderAreNotWritten) {
   for (const char* name : {"lock", "config.toml", "checkpoint.next.ckpt", "progress.csv", "learning_curve.png"}) {
     const std::string run = folder_ / (std::string("run_with_") + name);
     std::filesystem::create_directory(run);
@@ -581,7 +581,7 @@ TEST_F(Training, TheLastCheckpointsAreKept) {
   EXPECT_EQ(read_file(folder_ / "run/checkpoint.1.ckpt"), newest);
 }
 
-TEST(Milestones, AreNamedByTheLastMultipleThatAnUpdatePasses) {
+TEST(Milestones, AreNamedByTheLastMultipleWithinAnUpdate) {
   EXPECT_EQ(milestone_name(0, 249999999, 250000000), "");
   EXPECT_EQ(milestone_name(249999999, 250000000, 250000000), "milestone_250M.ckpt");
   EXPECT_EQ(milestone_name(250000000, 251000000, 250000000), "");
@@ -591,7 +591,7 @@ TEST(Milestones, AreNamedByTheLastMultipleThatAnUpdatePasses) {
   EXPECT_EQ(milestone_name(90, 110, 0), "");
 }
 
-TEST_F(Training, MilestonesAreKeptAndTheSameAfterResuming) {
+TEST_F(Training, MilestonesAreKeptAndEqualAfterResuming) {
   const std::vector<std::string> settings{"train.milestone_agent_steps=50", "train.checkpoint_every=1"};
   const auto milestones = [&](const std::string& run) {
     std::vector<std::pair<std::string, int64_t>> all;
@@ -627,7 +627,7 @@ TEST_F(Training, MilestonesAreKeptAndTheSameAfterResuming) {
   EXPECT_EQ(milestones("blocked"), milestones("whole"));
 }
 
-TEST_F(Training, ARunThatDivergesStopsAndKeepsTheMinibatch) {
+TEST_F(Training, ADivergingRunStopsAndKeepsTheMinibatch) {
   TrainOptions o = options("run", {"policy.modality=vector", "train.learning_rate=100"});
   EXPECT_THAT(message_of([&] { train(o); }), AllOf(HasSubstr("update 1, epoch "), HasSubstr("not finite"),
                                                    HasSubstr(folder_ / "run/failed_minibatch.safetensors")));
@@ -637,7 +637,7 @@ TEST_F(Training, ARunThatDivergesStopsAndKeepsTheMinibatch) {
   EXPECT_THAT(kept, AllOf(HasSubstr(R"("rows":{"dtype":"I64")"), HasSubstr(R"("lanes":{"dtype":"F32")")));
 }
 
-TEST_F(Training, ASecondRunIntoAFolderInUseIsRefusedAndTheFirstGoesOn) {
+TEST_F(Training, ASecondRunIntoAFolderInUseIsRefusedAndTheFirstContinues) {
   std::vector<std::string> refusals;
   TrainOptions first = options("run", {"train.updates=2"});
   first.on_progress = [&](const TrainProgress&) {
@@ -653,7 +653,7 @@ TEST_F(Training, ASecondRunIntoAFolderInUseIsRefusedAndTheFirstGoesOn) {
   EXPECT_EQ(train(options("alone", {"train.updates=2"})).policy_hash, report.policy_hash);
 }
 
-TEST_F(Training, RefusesToResumeUnderAnotherConfigurationByName) {
+TEST_F(Training, ResumeErrorsNameConfigurationDifferences) {
   train(options("run", {"train.updates=1"}));
   TrainOptions changed = options("run", {"policy.backbone_width=64"});
   changed.old_run = OldRun::resume;
@@ -668,7 +668,7 @@ TEST_F(Training, RefusesToResumeUnderAnotherConfigurationByName) {
   EXPECT_THROW(train(nothing), Error);
 }
 
-TEST_F(Training, GoesOnWithOtherNumbersOfAgentsAndMinibatches) {
+TEST_F(Training, ResumesWithOtherNumbersOfAgentsAndMinibatches) {
   const TrainReport first = train(options("run", {"train.updates=1"}));
   TrainOptions rest = options("run", {"train.updates=2", "simulator.num_slots=48", "train.minibatch_size=96"});
   rest.old_run = OldRun::resume;
@@ -682,7 +682,7 @@ TEST_F(Training, GoesOnWithOtherNumbersOfAgentsAndMinibatches) {
   EXPECT_THAT(notices, Contains(HasSubstr("train.minibatch_size: ")));
 }
 
-TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
+TEST_F(Training, StartsWithWeightsOfAnotherRunAtAnyImageSize) {
   const std::string first = train(options("first", {"train.updates=1"})).checkpoint;
   const std::vector<NamedTensor> other = read_checkpoint(first).parameters;
   for (const std::string file : {"checkpoint.ckpt", "policy.safetensors"}) {
@@ -712,13 +712,13 @@ TEST_F(Training, BeginsWithTheWeightsOfAnotherRunAtAnyImageSize) {
               AllOf(HasSubstr(first), HasSubstr("policy.segment_features: expected true, got false")));
 }
 
-TEST_F(Training, EndsWhereLogitsAreFiniteNoLonger) {
+TEST_F(Training, StopsOnNonFiniteLogits) {
   // Logits exceed all floats after an update.
   const TrainOptions o = options("run", {"train.updates=4", "train.sharpen_agent_steps=1"});
   EXPECT_THAT(message_of([&] { train(o); }), HasSubstr("update 3: expected finite logits and values in the rollout"));
 }
 
-TEST_F(Training, RefusesToDriveByLogitsThatAreNotFinite) {
+TEST_F(Training, RefusesToDriveWithNonFiniteLogits) {
   SavedPolicy policy = read_policy(train(options("run", {"train.updates=1", "policy.modality=vector"})).checkpoint);
   for (NamedTensor& parameter : policy.parameters) {
     if (parameter.name == "actor.weight") parameter.value.fill_(3e38);  // finite, but its sums are not
@@ -729,7 +729,7 @@ TEST_F(Training, RefusesToDriveByLogitsThatAreNotFinite) {
               HasSubstr("expected finite logits and values"));
 }
 
-TEST_F(Training, RefusesMinutesThatAreNone) {
+TEST_F(Training, RefusesInvalidMinutes) {
   for (const double minutes :
        {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     TrainOptions o = options("run", {});
@@ -739,7 +739,7 @@ TEST_F(Training, RefusesMinutesThatAreNone) {
   }
 }
 
-TEST_F(Training, ANormalizedPolicyWithAQuantileFilterGoesOnExactly) {
+TEST_F(Training, ANormalizedPolicyWithAQuantileFilterResumesExactly) {
   const auto [whole, again, resumed] = test::policies_of_equal_runs(
       folder_ / "runs", "cpu",
       {"policy.modality=vector", "policy.layer_norm=true", "policy.residual=true", "train.adv_filter=quantile"});
@@ -747,7 +747,7 @@ TEST_F(Training, ANormalizedPolicyWithAQuantileFilterGoesOnExactly) {
   EXPECT_EQ(whole, resumed);
 }
 
-TEST_F(Training, APolicyThatReadsSegmentsGoesOnExactlyAndIsEvaluatedAsSaved) {
+TEST_F(Training, ASegmentPolicyResumesExactlyAndIsEvaluatedAsSaved) {
   const auto [whole, again, resumed] =
       test::policies_of_equal_runs(folder_ / "runs", "cpu", {"policy.modality=vector", "policy.segment_features=true"});
   EXPECT_EQ(whole, again);
@@ -810,7 +810,7 @@ TEST_F(Training, VectorPolicyTrainsAndIsEvaluated) {
   EXPECT_THROW(evaluate(o), UsageError);
 }
 
-TEST_F(Training, InterruptedEvaluationKeepsWhatItFinished) {
+TEST_F(Training, InterruptedEvaluationKeepsFinishedScenarios) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EvaluateOptions o;
   o.device = "cpu";
@@ -836,7 +836,7 @@ TEST_F(Training, InterruptedEvaluationKeepsWhatItFinished) {
       ::testing::ExitedWithCode(0), "");
 }
 
-TEST_F(Training, EvaluationRepeatsNoWorldOfTraining) {
+TEST_F(Training, EvaluationAndTrainingWorldsDiffer) {
   static_assert(kFirstEvaluationWorld >= uint32_t{kMaxSlots}, "training has at most one world per agent");
   EvaluateOptions o;
   o.device = "cpu";
@@ -876,7 +876,7 @@ std::string one_camera(const std::string& path) {
   return path;
 }
 
-TEST_F(Training, PoliciesDriveInTheWorldAndSeeTheImagesThatTheyWereTrainedOn) {
+TEST_F(Training, EvaluationUsesWorldAndImageSettingsOfTraining) {
   const std::string rig = one_camera(folder_ / "rig.toml");
   write_file(
       folder_ / "config.toml",
@@ -1002,7 +1002,7 @@ TEST_F(Training, ASessionGivesLogitsAndValuesOfAnyScene) {
               HasSubstr("renderer"));
 }
 
-TEST_F(Training, TheVectorPolicyLearnsFromWallsWhereItObservesThem) {
+TEST_F(Training, TheVectorPolicyLearnsFromObservedWalls) {
   const std::vector<std::string> walls{"train.updates=1", "policy.modality=vector", "simulator.walls=true",
                                        "simulator.wall_observations=true"};
   const TrainReport report = train(options("run", walls));

@@ -34,7 +34,7 @@ Config averaged_config() {
   return config;
 }
 
-TEST(WeightAverage, IsTheMeanAtFirstAndExponentialLater) {
+TEST(WeightAverage, IsFirstAMeanThenExponential) {
   const PolicyNetwork policy(averaged_config().policy, 4, 1);
   WeightAverage average(policy, 2);  // the newest weights count 1 - 2^(-1/2) = .2929 from the fourth update on
   EXPECT_TRUE(are_equal(average.values, policy.parameters()));
@@ -68,7 +68,7 @@ TEST(WeightAverage, AfterItsHalfLifeOldWeightsCountHalf) {
   EXPECT_NEAR(average.values[0].value.max().item<double>(), 0.5, 1e-5);
 }
 
-TEST(WeightAverage, ReplacedWeightsComeBackToTheBit) {
+TEST(WeightAverage, ReplacedWeightsAreRestoredBitwise) {
   const PolicyNetwork policy(averaged_config().policy, 4, 1), other(averaged_config().policy, 4, 2);
   const std::string own = policy.hash();
   {
@@ -89,7 +89,7 @@ class RunWithAverage : public ::testing::Test {
   test::ScratchFolder folder_;
 };
 
-TEST_F(RunWithAverage, LearnsTheSameAndKeepsTheAverageBeside) {
+TEST_F(RunWithAverage, LearnsIdenticallyAndSavesTheAverage) {
   const auto [without, with] = test::check_average_by_hand(folder_.path(), "cpu");
   EXPECT_FALSE(std::filesystem::exists(path("without/policy_average.safetensors")));
   EXPECT_TRUE(read_checkpoint(without.checkpoint).average.empty());
@@ -105,7 +105,7 @@ TEST_F(RunWithAverage, LearnsTheSameAndKeepsTheAverageBeside) {
 
 TEST_F(RunWithAverage, ResumesExactly) { test::check_average_resumes_exactly(folder_.path(), "cpu"); }
 
-TEST_F(RunWithAverage, MayBeginOnResume) {
+TEST_F(RunWithAverage, MayStartOnResume) {
   train(options("run", {"train.updates=3"}));
   TrainOptions rest = options("run", {"train.weight_average=1"});
   rest.old_run = OldRun::resume;
