@@ -291,7 +291,7 @@ std::unique_ptr<Renderer> make_gl_renderer(const std::string& name, const Render
   auto interop = interop_for(name, config.device);
   const int cuda_device = interop ? interop->device().index : -1;
   std::unique_ptr<gl::Context> context;
-  std::string why = "asked for";
+  std::string why = "requested";
   if (name == "gl:osmesa") {
     context = gl::make_osmesa_context();
   } else if (name == "gl:egl" || interop) {

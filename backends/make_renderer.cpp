@@ -92,8 +92,8 @@ std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererC
   if (config.samples != PixelSamples{}) {
     fail_usage("renderer {}: samples: only gl supports samples; the other renderers compute exact coverage", name);
   }
-  if (name == "cpu") return chosen("cpu: asked for"), make_cpu_renderer(config);
-  if (name == "null") return chosen("null: asked for"), std::make_unique<NullRenderer>(config);
+  if (name == "cpu") return chosen("cpu: requested"), make_cpu_renderer(config);
+  if (name == "null") return chosen("null: requested"), std::make_unique<NullRenderer>(config);
 #ifdef PICTURA_HAS_CUDA
   const std::string unavailable = cuda_unavailable();
   auto make_cuda = [&](const char* why) {
@@ -105,7 +105,7 @@ std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererC
   };
   if (name == "cuda") {
     PICTURA_CHECK(unavailable.empty(), "renderer cuda: {}", unavailable);
-    return make_cuda("asked for");
+    return make_cuda("requested");
   }
   const std::string why_not_cuda = !config.device.is_host() ? unavailable : "scenes and images lie in host memory";
   if (name == "auto" && why_not_cuda.empty()) return make_cuda("a device was found");

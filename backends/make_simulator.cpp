@@ -28,13 +28,13 @@ std::unique_ptr<Simulator> make_simulator(const std::string& name, const Simulat
   };
   const auto setup = [&] { return SimulatorSetup(config, std::move(maps), {}, std::move(worlds)); };
   const auto make_cpu = [&] { return make_cpu_simulator(setup()); };
-  if (name == "cpu") return chosen("cpu: asked for"), make_cpu();
+  if (name == "cpu") return chosen("cpu: requested"), make_cpu();
 #ifdef PICTURA_HAS_CUDA
   const auto make_cuda = [&] { return make_cuda_simulator(setup()); };
   if (name == "cuda") {
     const std::string unavailable = cuda_unavailable();
     PICTURA_CHECK(unavailable.empty(), "simulator cuda: {}", unavailable);
-    return chosen("cuda: asked for"), make_cuda();
+    return chosen("cuda: requested"), make_cuda();
   }
   const std::string why_not_cuda =
       !config.device.is_host() ? cuda_unavailable() : "observations are wanted in host memory";

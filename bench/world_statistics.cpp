@@ -60,7 +60,8 @@ void count_population(HostWorlds& worlds, const LaneGraph& graph, Counts* counts
     const auto [on_roads, on_walkways] = follow_goals(world, graph, 1);
     count("waypoints of the first chains", "waypoints",
           static_cast<double>(on_roads.waypoints + on_walkways.waypoints));
-    count("of these out of reach", "waypoints", static_cast<double>(on_roads.unreachable + on_walkways.unreachable));
+    count("unreachable waypoints of the first chains", "waypoints",
+          static_cast<double>(on_roads.unreachable + on_walkways.unreachable));
     throw_if_interrupted();
   }
 }

@@ -207,7 +207,7 @@ struct FunctionSession final : SessionParts {
   std::string policy_hash() const override { return function.name(); }
 
   std::unique_ptr<SessionParts> make_untrained(uint64_t /*seed*/) const override {
-    fail_usage("{}: expected a saved policy, whose weights can be drawn anew, got a function", function.name());
+    fail_usage("{}: expected a saved policy, whose weights can be randomized, got a function", function.name());
   }
 
   void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out,

@@ -33,7 +33,7 @@ void add_serve_options(CLI::App* command, ServeOptions* options_out) {
       ->expected(0, 1);
   command->add_option("--serve-host", options_out->host_name,
                       "With --serve: listen on all network interfaces, for browsers that reach this machine by this "
-                      "host name. Anyone with the page's address can then drive; nothing is encrypted");
+                      "host name. Every person with the page's address can then drive; nothing is encrypted");
 }
 
 }  // namespace pictura

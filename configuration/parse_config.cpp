@@ -369,7 +369,7 @@ void check_scenes(const Config& c, const Reader& reader) {
     const std::optional<std::string> source = scene_source(map);
     if (!source || source->empty()) {
       reader.throw_error("simulator.maps",
-                         fmt::format("expected recorded scenes alone, each as scenes:NAME, got '{}'", map));
+                         fmt::format("expected only recorded scenes, each as scenes:NAME, got '{}'", map));
     }
   }
   if (c.simulator.map_copies > 0) reader.throw_error("simulator.map_copies", "expected 0 with recorded scenes");

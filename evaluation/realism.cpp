@@ -247,9 +247,9 @@ std::vector<RealismPose> RealismScene::poses_of(const SceneRollouts& rollouts, s
   for (size_t i = 0; i < rollouts.track_ids.size(); ++i) {
     const int64_t track = rollouts.track_ids[i];
     const auto found = objects.find(track);
-    PICTURA_CHECK(found != objects.end(), "scene {}: rollout {}: track {} is not there at step {} of the recording", id,
+    PICTURA_CHECK(found != objects.end(), "scene {}: rollout {}: track {} is absent at step {} of the recording", id,
                   rollout, track, kRealismStart);
-    PICTURA_CHECK(!is_given[found->second], "scene {}: rollout {}: track {} is there twice", id, rollout, track);
+    PICTURA_CHECK(!is_given[found->second], "scene {}: rollout {}: track {} occurs twice", id, rollout, track);
     is_given[found->second] = 1;
     for (size_t step = 0; step < kRealismSteps; ++step) {
       const SimulatedState& state = states[i * kRealismSteps + step];
@@ -437,7 +437,7 @@ RealismReport score_rollouts(const std::string& path, const std::vector<std::str
         report.faults.push_back(std::move(outcome.fault));
         ++uses[outcome.id];
       } else {
-        PICTURA_CHECK(++uses[outcome.id] == 1, "scenario '{}' is in {} twice", outcome.id, fmt::join(scenes, ", "));
+        PICTURA_CHECK(++uses[outcome.id] == 1, "scenario '{}' occurs twice in {}", outcome.id, fmt::join(scenes, ", "));
         report.scenes.push_back(std::move(outcome.realism));
       }
     }

@@ -92,7 +92,7 @@ void read_joint_scene(std::string_view message, SceneRollouts* scene_inout) {
       const int64_t id = read_trajectory(reader.bytes(), &one);
       if (is_first) {
         if (scene_inout->steps == 0) scene_inout->steps = static_cast<int>(one.size());
-        if (!places.emplace(id, count).second) fail_field("", "object {} is there twice", id);
+        if (!places.emplace(id, count).second) fail_field("", "object {} occurs twice", id);
         scene_inout->track_ids.push_back(id);
       }
       if (one.size() != static_cast<size_t>(scene_inout->steps) || one.empty()) {
@@ -102,7 +102,7 @@ void read_joint_scene(std::string_view message, SceneRollouts* scene_inout) {
         states.insert(states.end(), one.begin(), one.end());
       } else {
         const auto place = places.find(id);
-        if (place == places.end()) fail_field("", "object {} is there twice, or not in the first rollout", id);
+        if (place == places.end()) fail_field("", "object {} occurs twice, or not in the first rollout", id);
         std::copy(one.begin(), one.end(), states.begin() + static_cast<ptrdiff_t>(place->second * steps));
         places.erase(place);
       }
@@ -182,7 +182,7 @@ RolloutsReader::RolloutsReader(const std::string& path)
         for (womd::WireReader scene(reader.bytes()); scene.next();) {
           if (is_field(scene, Rollouts::scenario_id)) id = scene.bytes();
         }
-        if (!scenes_.emplace(id, reader.bytes()).second) fail_field("", "scenario '{}' is there twice", id);
+        if (!scenes_.emplace(id, reader.bytes()).second) fail_field("", "scenario '{}' occurs twice", id);
       });
     }
   } catch (const FieldError& error) {

@@ -96,7 +96,7 @@ Text text_of(RepairKind kind) {
     case RepairKind::empty_lanelet: return {"lanelets of no length", "left out"};
     case RepairKind::unknown_subtype: return {"unknown subtypes of lanelets", "counted as other lanes"};
     case RepairKind::open_area: return {"areas whose outline is not closed or crosses itself", "left out"};
-    case RepairKind::empty_rule: return {"regulatory elements without what they need", "left out"};
+    case RepairKind::empty_rule: return {"incomplete regulatory elements", "left out"};
   }
   return {"unknown", "unknown"};
 }

@@ -17,7 +17,7 @@ struct AgentFieldInfo {
   std::string_view comment;
 };
 
-/// In the order of AgentField.
+/// Descriptions of agent fields, in the order of AgentField.
 constexpr AgentFieldInfo kAgentFields[] = {
 #define X(name, type, per_agent, first, comment) {#name, element_type<type>(), per_agent, comment},
     PICTURA_AGENT_FIELDS(X)

@@ -15,7 +15,7 @@ constexpr int kMaxControls = 10, kControlFeatures = 7;
 constexpr int kMaxWalls = 80, kWallFeatures = 7;
 constexpr int kWaypointFeatures = 3;
 
-/// In the order of ObservationView::set_counts.
+/// Sets of observed entities, in the order of ObservationView::set_counts.
 enum class EntitySet : int32_t { partners, lanes, boundaries, controls, walls };
 constexpr int kNumEntitySets = 5;
 

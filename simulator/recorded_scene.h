@@ -43,7 +43,7 @@ WorldSpec scene_world(const CompiledMap& map, int index = 0, uint32_t global_wor
 std::vector<uint8_t> tracks_selected_by(const Scenario& scenario, const std::string& words);
 /// Returns the same as tracks_selected_by(). Also throws UsageError for a word that selects no track.
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words);
-/// As tracks_of(), but without tracks that are absent at a step. Also throws UsageError if no track remains.
+/// Returns the tracks of tracks_of() that are present at a step. Also throws UsageError if no track remains.
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words, int32_t step);
 
 /// Horizontal distance from center_m to the track's recorded position; nullopt without a recorded state.

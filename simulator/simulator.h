@@ -67,7 +67,7 @@ struct SimulatorConfig {
   }
 };
 
-/// In the order of LightCycles.
+/// Names of light cycles, in the order of LightCycles.
 constexpr const char* kLightCyclesNames[] = {"phases", "independent"};
 constexpr const char* name_of(LightCycles cycles) { return kLightCyclesNames[static_cast<int>(cycles)]; }
 /// Throws UsageError, which lists the names, for a name not in kLightCyclesNames.

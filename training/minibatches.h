@@ -26,7 +26,7 @@ class Minibatches {
   Minibatches(const at::Tensor& rows, const Rollout& rollout, int64_t max_size, LearnerExecutor* executor,
               Communicator* communicator);
 
-  /// Over all ranks.
+  /// Transitions per epoch over all ranks.
   int64_t global_size() const { return global_size_; }
   /// Minibatches per epoch.
   int64_t count() const { return count_; }

@@ -25,7 +25,7 @@ struct DrawMemory {
   using Word = Word_;
   static constexpr int kThreads = kThreads_;
   static constexpr int kHalf = 4 * sizeof(Word);
-  /// No face or pixel, in a word's lower half.
+  /// Marks a word's lower half without face or pixel.
   static constexpr Word kNone = (Word{1} << kHalf) - 1;
   /// Flag in a candidate's lower half: the face covers the pixel fully.
   static constexpr Word kCoversFully = Word{1} << (kHalf - 1);

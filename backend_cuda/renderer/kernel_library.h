@@ -17,7 +17,7 @@ class KernelLibrary {
   explicit KernelLibrary(const RendererConfig& config);
 
   const KernelSet& kernels() const { return kernels_; }
-  /// For messages.
+  /// Describes how and when the kernels were built, for messages.
   const std::string& origin() const { return origin_; }
 
  private:

@@ -148,7 +148,7 @@ void append_results(const std::string& name, const RenderCase& measured, const R
     const double share =
         static_cast<double>(measurement.error.differing) / static_cast<double>(measurement.error.values);
     results_out->push_back({name + ", values unlike the oracle's", "%", {100 * share}});
-    results_out->push_back({name + ", most unlike", "1/255", {255 * measurement.error.worst}});
+    results_out->push_back({name + ", largest difference", "1/255", {255 * measurement.error.worst}});
     if (measured.planes == Planes::all) {
       results_out->push_back({name + ", planes unlike the oracle's",
                               "pixels",

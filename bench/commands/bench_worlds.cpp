@@ -36,7 +36,7 @@ void run_worlds(WorldsArguments arguments) {
   }
   progress.finish();
   report_benchmark(arguments.json,
-                   {.workload = fmt::format("worlds: {} episodes of each map, {} agents asked for; lane drivers alone "
+                   {.workload = fmt::format("worlds: {} episodes of each map, {} requested agents; one lane keeper "
                                             "among parked cars, for 1,280 steps",
                                             arguments.options.episodes, arguments.options.agents),
                     .backend = "cpu"},

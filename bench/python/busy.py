@@ -1,9 +1,9 @@
-"""What other busy processes cost: times of commands, beside none, one and more of them, in turn.
+"""Measures how other busy processes slow down commands.
 
 python bench/python/busy.py [--busy 0,1,2] [--rounds N] [--max-foreign SHARE] PICTURA... -- ARGUMENTS
 
-Every PICTURA (a command, or VARIABLE=VALUE,COMMAND) runs with the ARGUMENTS in each round, one after the other; medians are reported.
-Rounds in which processes that are not ours took more than SHARE of the processors are left out.
+In each round, every PICTURA (a command, or VARIABLE=VALUE,COMMAND) runs once with the ARGUMENTS. Prints the median times.
+Discards times during which other processes used more than SHARE of the processors.
 """
 
 import argparse
@@ -35,7 +35,7 @@ def busy_s(processes) -> float:
 
 
 def run(command: str, arguments: list[str], folder: str, processes, max_foreign: float) -> float | None:
-    """Seconds, or None where others took a part of the processors."""
+    """Returns the seconds, or None if other processes used more than max_foreign of the processors."""
     *variables, program = command.split(",")
     environment = os.environ | dict(variable.split("=", 1) for variable in variables)
     own, busy, all_, begin = own_s(), busy_s(processes), processor_s(), time.monotonic()

@@ -1,9 +1,9 @@
-"""What Python adds to a step: the time of simulator.step() and of taking its arrays, less that of the same steps from C++.
+"""Measures Python's overhead per step: the time of simulator.step() and of taking its arrays, minus the time of the same steps in C++.
 
 python bench/python/overhead.py [--device cuda] [--agents N] [--images]
 
-Rounds of both alternate, and the median of the differences is reported, with both times. With --images every step is
-drawn too, from Python, and the overhead is given as a part of the whole step.
+Alternates rounds of both, and prints the median of the differences and both times. With --images, also measures steps that
+are drawn from Python, and prints the overhead as a share of such a step.
 """
 
 import argparse

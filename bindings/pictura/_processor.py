@@ -32,7 +32,7 @@ def folder_of_extensions(package: pathlib.Path, cpuinfo: str, built_for: str = P
         return package
     if not (package / "x86_64").is_dir():
         raise ImportError(
-            "pictura: this package was built for x86-64-v3 (AVX2 and FMA) alone: install a wheel that has both builds, or build one"
+            "pictura: this package was built for x86-64-v3 (AVX2 and FMA) only: install a wheel that has both builds, or build one"
             " for this processor: pip install --config-settings=cmake.define.PICTURA_CPU_ARCH=x86-64 . from a checkout"
         )
     return package / "x86_64"

@@ -331,7 +331,7 @@ class CameraView {
     const perHalf = 0.5 * grid * 2 ** gl.getParameter(gl.SUBPIXEL_BITS);
     gl.uniform2f(face.positions, perHalf * width, perHalf * height);
     gl.uniform1f(face.floor_px, this.header.line_floor_px);
-    // Of surfaces at equal depth the first is kept: agents, lights, walls, strips.
+    // The first of several surfaces at equal depth is kept. Order: agents, lights, walls, strips.
     for (const { array, count } of [this.buffers[1], this.buffers[0]]) {
       gl.bindVertexArray(array);
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count);

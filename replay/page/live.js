@@ -139,7 +139,7 @@ class LiveConnection {
       listen("look", message => { this.replay.addLook(message); this.on.change(); });
       listen("status", ({ paused, pace, driven }) => {
         Object.assign(this, { paused, pace, driven });
-        // Driving was taken away, unless the request is only not answered yet.
+        // Another page took over driving, unless the request is still pending.
         if (driven === this.mine) this.isMine = true;
         else if (this.isMine) this.mine = -1;
         this.on.change();
@@ -147,7 +147,7 @@ class LiveConnection {
       listen("end", () => { this.state = "ended"; source.close(); this.on.change(); });
       source.addEventListener("error", () => {
         if (this.state === "ended") return;
-        // A connection that is only lost is retried.
+        // A lost connection is retried.
         const isRefused = source.readyState === EventSource.CLOSED;
         if (isRefused && !this.replay) { giveUp(new Refused(REFUSED)); return; }
         this.state = isRefused ? "refused" : "lost";

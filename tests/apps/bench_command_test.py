@@ -74,7 +74,7 @@ class Benchmarks(CommandCase):
         facts = self.json_of("bench", "render", *self.QUICK, "--backend", "cuda", "--size", "8x8", "--egos", 3)
         self.assertRegex(facts["driver"], r"^\d+\.\d+.*, CUDA \d+\.\d+$")
         self.assertIn("NVIDIA", facts["device"])
-        self.assertRegex(facts["workload"], "cuda: asked for; kernels built (earlier )?for sm_")
+        self.assertRegex(facts["workload"], "cuda: requested; kernels built (earlier )?for sm_")
         rows = {row["name"]: row["value"] for row in facts["results"]}
         self.assertGreater(rows["cuda 8x8 3 egos"], 0)
         self.assertEqual(rows["cuda 8x8 3 egos, values unlike the oracle's"], 0)
@@ -140,7 +140,7 @@ class Benchmarks(CommandCase):
         classes = sum(values[name]["mean"] for name in ("vehicles", "cyclists", "pedestrians"))
         refused = sum(values[name]["mean"] for name in ("refused, places taken", "refused, no place"))
         self.assertAlmostEqual(classes + refused, 30)
-        self.assertEqual(values["of these out of reach"]["max"], 0)
+        self.assertEqual(values["unreachable waypoints of the first chains"]["max"], 0)
         self.assertGreater(values["random policy: collisions"]["mean"] + values["random policy: off-road"]["mean"], 0)
         self.assertGreater(values["lane driver: goals"]["mean"], 0)
         self.assertEqual(values["lane driver: red lights"]["max"], 0)

@@ -126,7 +126,7 @@ class Evaluation(CommandCase):
     def test_severities_of_randomized_cameras_are_rows(self):
         out = self.folder / "run"
         self.json_of("train", *TINY, "--set", "train.updates=1", "--out", out)
-        # Sampled, so that a policy's observations matter before it has learnt to drive.
+        # Sampled, so that a policy's observations matter before it has learned to drive.
         small = [out / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 20, "--steps", 60, "--sampled", "--device", "cpu"]
         drive = [*small, "--scenarios", 2]
         rows = self.json_of("evaluate", *drive, "--camera-severity", "0,0.5,2")["rows"]

@@ -96,7 +96,7 @@ TEST(Config, RecordedScenesHaveTheirOwnSettings) {
     return test::message_of<Error>([&] { config_of(maps, more); });
   };
   const std::string scenes = R"("scenes:a")";
-  EXPECT_THAT(refusal(R"("scenes:a", "Town01")"), HasSubstr("simulator.maps: expected recorded scenes alone"));
+  EXPECT_THAT(refusal(R"("scenes:a", "Town01")"), HasSubstr("simulator.maps: expected only recorded scenes"));
   EXPECT_THAT(refusal(R"("Town01", "scenes:a")"), HasSubstr("simulator.maps: expected either roads or recorded"));
   EXPECT_THAT(refusal(R"("scenes:")"), HasSubstr("each as scenes:NAME, got 'scenes:'"));
   EXPECT_THAT(refusal(scenes, {"simulator.map_copies=1"}), HasSubstr("simulator.map_copies: expected 0"));

@@ -1,7 +1,7 @@
-"""docs/reference/commands/: a page a command with its help, as `pictura COMMAND --help` prints it, and an index of them.
+"""Writes docs/reference/commands/: one page per command with the output of `pictura COMMAND --help`, and an index.
 
-    python3 tests/docs/commands.py PICTURA            writes them
-    python3 tests/docs/commands.py PICTURA --check    prints where they differ, and exits with 1 if they do
+    python3 tests/docs/commands.py PICTURA            writes the pages
+    python3 tests/docs/commands.py PICTURA --check    prints differences from the pages, and exits with 1 if there are any
 """
 
 import difflib
@@ -55,7 +55,7 @@ def subcommands(text):
 
 
 def tree(pictura, command=()):
-    """[(command, help)] of all commands, each before its subcommands."""
+    """Returns [(command, help)] of all commands, each before its subcommands."""
     text = help_of(pictura, command)
     found = [(command, text)]
     for name in subcommands(text):
@@ -64,7 +64,7 @@ def tree(pictura, command=()):
 
 
 def of_whole_build(text):
-    """The help of a build with every backend, whichever this build has."""
+    """Returns the help of a build with all backends, from the help of any build."""
     text = re.sub(r"(Backend of the simulator: )cpu.*?(; default)", r"\1cpu, cuda, auto\2", text)
     return re.sub(r"(Backend of the renderer: )cpu.*?(; default)", r"\1cpu, cuda, gl, gl:egl, gl:osmesa, null, auto\2", text)
 
@@ -74,7 +74,7 @@ def page_name(command):
 
 
 def pages_of(commands):
-    """{file name: text} of the folder."""
+    """Returns {file name: text} of all pages."""
     made, rows = {}, []
     for command, text in commands:
         title = " ".join(("pictura", *command))
@@ -86,13 +86,13 @@ def pages_of(commands):
 
 
 def commands_of_pages():
-    """The commands that have a page."""
+    """Returns the commands that have a page."""
     titles = (path.read_text().split("\n", 1)[0] for path in FOLDER.glob("*.md") if path.name != "index.md")
     return {tuple(title.split()[2:]) for title in titles}
 
 
 def differences(made):
-    """Lines of a unified diff from the pages that are there to those of the program."""
+    """Returns the lines of a unified diff from the existing pages to `made`."""
     there = {path.name: path.read_text() for path in FOLDER.glob("*.md")}
     lines = []
     for name in sorted(there.keys() | made.keys()):

@@ -1,4 +1,4 @@
-"""Pages of the documentation as text: which there are, their anchors, and the blocks that readers see."""
+"""Lists pages of the documentation, and extracts their headings, anchors, links and visible text."""
 
 import pathlib
 import re
@@ -30,13 +30,13 @@ def without_code(text):
 
 
 def slug_of(heading):
-    """The anchor of a heading, as GitHub and mkdocs make it."""
+    """Returns the anchor that GitHub and MkDocs create for a heading."""
     heading = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading)
     return re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-")
 
 
 def headings(text):
-    """[(line, level, title)] of a page."""
+    """Returns [(line, level, title)] of a page."""
     matches = ((number, re.match(r"(#+) (.*)$", line)) for number, line in enumerate(without_blocks(text).split("\n"), 1))
     return [(number, len(match[1]), match[2]) for number, match in matches if match]
 
@@ -52,7 +52,7 @@ def anchors(path):
 
 
 def links(text):
-    """[(line, target)] of a page's links and images to files and anchors of the repository."""
+    """Returns [(line, target)] of a page's links and images that lead to files and anchors of the repository."""
     found = []
     for number, line in enumerate(without_code(text).split("\n"), 1):
         found += [(number, target) for target in re.findall(r"\]\(([^)\s]+)\)", line) if not re.match(r"[a-z]+:", target)]
@@ -85,7 +85,7 @@ def blocks(text):
 
 
 def words(text):
-    """Words that a reader reads: a piece of code is one, a link is its text."""
+    """Returns the visible words of a text. A piece of code counts as one word; of a link, only its text counts."""
     text = re.sub(r"`[^`]*`", "code", text)
     text = re.sub(r"\]\([^)]*\)", "]", text)
     return [word for word in text.split() if re.search(r"\w", word)]

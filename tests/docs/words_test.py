@@ -1,7 +1,7 @@
-"""How pages are written: lengths, turns, headings, links and navigation. Prints FILE:LINE and the rule for each violation.
+"""Tests the style of pages: lengths, turns, headings, links and navigation. Prints FILE:LINE and the rule for each violation.
 
 Run by ctest: python3 words_test.py [unittest arguments]. Also
-    python3 words_test.py --report      prints words a page, and every violation, research and CHANGELOG included
+    python3 words_test.py --report      prints the words of each page and all violations, also on exempt pages
     python3 words_test.py --comments    prints forbidden turns in comments and docstrings of sources
 """
 
@@ -41,7 +41,7 @@ SOURCES = ("*.h", "*.cpp", "*.cu", "*.cuh", "*.py", "*.pyi", "*.cmake", "*CMakeL
 
 
 def forbidden_turns():
-    """[(pattern, what to write instead)]"""
+    """Returns [(pattern, what to write instead)]."""
     lines = (pathlib.Path(__file__).parent / "forbidden_turns.txt").read_text().splitlines()
     pairs = [line.split(" => ") for line in lines if line and not line.startswith("#")]
     return [(re.compile(pattern, re.IGNORECASE), instead) for pattern, instead in pairs]
@@ -57,7 +57,7 @@ def turns_in(text):
 
 
 def violations(text, page_words=PAGE_WORDS):
-    """[(line, rule, message)] of one page."""
+    """Returns [(line, rule, message)] of a page."""
     found = []
     length = len(pages.words(pages.without_blocks(text)))
     if length > page_words:
@@ -117,7 +117,7 @@ def page_violations(path, with_exempt=False):
 
 
 def counted_words():
-    """{page: words} of the pages of docs/ whose words count in total."""
+    """Returns {page: words} for pages of docs/ that count towards TOTAL_WORDS."""
     counted = {}
     for path in pages.documents():
         name = name_of(path)
@@ -127,7 +127,7 @@ def counted_words():
 
 
 def comments(path):
-    """[(line, text)] of the comments of a source file. Consecutive lines are joined; a comment after code begins a new one."""
+    """Returns [(line, text)] of a source file's comments. Joins consecutive lines; a comment after code begins a new entry."""
     text = path.read_text(errors="replace")
     lines = []
     if path.suffix in (".py", ".pyi") or text.startswith("#!/usr/bin/env python"):
@@ -154,7 +154,7 @@ def comments(path):
 
 
 def sources():
-    """Paths of the repository's sources, also of those that git does not know yet."""
+    """Returns the paths of the repository's sources, also of untracked ones."""
     top = [path for path in sorted(ROOT.iterdir()) if path.name[0] != "." and path.name not in GENERATED]
     paths = [inner for path in top for inner in ([path] if path.is_file() else sorted(path.rglob("*")))]
     return [path for path in paths if path.is_file() and any(fnmatch.fnmatch(name_of(path), pattern) for pattern in SOURCES)]
@@ -224,7 +224,7 @@ class Rules(unittest.TestCase):
     def test_comments_are_found(self):
         path = pathlib.Path(__file__)
         self.assertIn(' Rules that do not hold'.strip(), " ".join(text for _, text in comments(path)))
-        self.assertTrue(any("Each rule finds" in text for _, text in comments(path)))
+        self.assertTrue(any("each rule finds" in text for _, text in comments(path)))
         with tempfile.TemporaryDirectory() as folder:
             source = pathlib.Path(folder) / "a.h"
             source.write_text("// One\n// comment.\nint a;  // of a\nint b;  // of b\n        // and c\n")

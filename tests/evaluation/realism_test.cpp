@@ -297,7 +297,7 @@ TEST_F(RealismFiles, ReadBackEqual) {
 TEST_F(RealismFiles, ErrorsNameFileScenarioAndField) {
   EXPECT_THAT(
       message_of<Error>([&] { RolloutsReader(write("twice", bytes_of({rollout_at(8, 0), rollout_at(8, 0)}))); }),
-      AllOf(HasSubstr("twice: scenario_rollouts[1]"), HasSubstr("'straight' is there twice")));
+      AllOf(HasSubstr("twice: scenario_rollouts[1]"), HasSubstr("'straight' occurs twice")));
   std::string other;
   append_integer(2, 2, &other);
   EXPECT_THAT(message_of<Error>([&] { RolloutsReader(write("type", other)); }),

@@ -4,7 +4,7 @@ Usage: womd_protobuf_test.py SCENE_FIXTURE. The fixture's fields, by name, are e
 dataset's own schema (which the package py123d ships), and the record is read by the project's reader: it must give
 the scene of the project's own record. The project's record, in turn, must parse to the same message without unknown fields.
 
-Runs with the Python that $PICTURA_PY123D names, or this one; exits with 77 where that lacks py123d or protobuf:
+Runs with the Python $PICTURA_PY123D; default: the running one. Exits with 77 if it lacks py123d or protobuf. Setup:
   python3 -m venv py123d && py123d/bin/pip install --no-deps py123d==0.7.0 && py123d/bin/pip install protobuf numpy
 """
 
@@ -20,7 +20,7 @@ PACKAGE = "py123d.parser.wod.waymo_open_dataset.protos."
 
 
 def schema():
-    """The message Scenario. The schema's files can be loaded once those that they import are, in no stated order."""
+    """Returns the message class Scenario. A schema file loads only after the files that it imports, so this retries in any order."""
     package = importlib.import_module(PACKAGE.rstrip("."))
     names = [path.stem for path in pathlib.Path(next(iter(package.__path__))).glob("*_pb2.py")]
     for _ in range(len(names)):
@@ -34,7 +34,7 @@ def schema():
 
 
 def crc32c(data):
-    """Bit by bit, unlike the table of the code under test."""
+    """Computes CRC-32C bit by bit; the code under test uses a table."""
     crc = 0xFFFFFFFF
     for byte in data:
         crc ^= byte
@@ -64,7 +64,7 @@ def payload_of(record):
 
 
 def unknown_fields(message):
-    """Names of messages that hold fields that the schema lacks."""
+    """Returns the names of messages that contain fields that the schema lacks."""
     from google.protobuf import unknown_fields as unknown
 
     found = {message.DESCRIPTOR.name} if len(unknown.UnknownFieldSet(message)) else set()
@@ -93,23 +93,23 @@ def main():
         subprocess.run([tool, "write", name], check=True)
         theirs = json_format.Parse((folder / "womd_proto.json").read_text(), Scenario())
         assert len(theirs.tracks) == 12 and len(theirs.dynamic_map_states) == 91, "the fixture"
-        assert theirs.dynamic_map_states[90].lane_states[0].state == 6, "a light that says go"
+        assert theirs.dynamic_map_states[90].lane_states[0].state == 6, "a green light"
         ours = Scenario()
         ours.ParseFromString(payload_of((folder / "womd.tfrecord").read_bytes()))
         assert not unknown_fields(ours), unknown_fields(ours)
-        # proto2 keeps which fields were set, so this compares all that was written.
-        assert ours == theirs, "our record is another message than the fields by name"
+        # proto2 messages record which fields are set, so this compares all written fields.
+        assert ours == theirs, "our record differs from the fixture's fields"
         (folder / "theirs.tfrecord").write_bytes(tfrecord(theirs.SerializeToString()))
-        print("their bytes are", "equal to" if ours.SerializeToString() == theirs.SerializeToString() else "unlike", "ours")
+        print("their bytes are", "equal to" if ours.SerializeToString() == theirs.SerializeToString() else "different from", "ours")
         subprocess.run([tool, "compare", str(folder / "womd.tfrecord"), str(folder / "theirs.tfrecord")], check=True)
-        # A wrong light is found.
+        # The comparison must find a wrong light.
         theirs.dynamic_map_states[50].lane_states[1].state = 5
         (folder / "other.tfrecord").write_bytes(tfrecord(theirs.SerializeToString()))
         other = subprocess.run(
             [tool, "compare", str(folder / "womd.tfrecord"), str(folder / "other.tfrecord")], stdout=subprocess.PIPE, text=True
         )
         assert other.returncode == 1 and "light" in other.stdout, other
-    print("read alike")
+    print("both records give the same scene")
     return 0
 
 

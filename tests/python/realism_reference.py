@@ -1,14 +1,14 @@
 """A second implementation of the realism score, in NumPy, from only the published definition (docs/explanation/realism.md).
 
-It shares no code and no method with evaluation/realism*: boxes by Minkowski sums of polygons, edges by brute force over whole
-polylines, the sides of corners by their turn, histograms by np.histogram. It reads scenes by to_arrays().
+It shares no code and no method with evaluation/realism*. Box distances use Minkowski differences of polygons, edge distances a
+search over whole polylines, sides of corners their turning direction, and histograms np.histogram. Scenes come from to_arrays().
 """
 
 import numpy as np
 
 START, STEPS, DT = 10, 80, 0.1
 ROUNDING, FAR = 0.7, 1e9
-# name: (weight in 2024, in 2025, lowest, highest, bins); events have no bins.
+# name: (weight in 2024, weight in 2025, minimum, maximum, bins); events have no bins.
 FEATURES = {
     "linear_speed": (0.05, 0.05, 0, 25, 10), "linear_acceleration": (0.05, 0.05, -12, 12, 11),
     "angular_speed": (0.05, 0.05, -0.628, 0.628, 11), "angular_acceleration": (0.05, 0.05, -3.14, 3.14, 11),
@@ -23,7 +23,7 @@ def cross(a, b):
 
 
 def hull(points):
-    """The corners of the convex hull, counter-clockwise (Andrew's monotone chain)."""
+    """Returns the corners of the convex hull, counter-clockwise (Andrew's monotone chain)."""
     points = points[np.lexsort((points[:, 1], points[:, 0]))]
 
     def half(ordered):
@@ -44,7 +44,8 @@ def corners(x, y, heading, length, width):
 
 
 def box_distance(a, b):
-    """Distance of two rounded boxes (x, y, heading, length, width): the origin's to the Minkowski difference of their cores, less both radii."""
+    """Returns the distance of two rounded boxes (x, y, heading, length, width): the distance of the origin to the Minkowski difference of
+    their cores, minus both radii."""
     radii = [ROUNDING * min(box[3:]) / 2 for box in (a, b)]
     cores = [corners(*box[:3], box[3] - 2 * r, box[4] - 2 * r) for box, r in zip((a, b), radii)]
     polygon = hull((cores[0][:, None] - cores[1][None]).reshape(-1, 2))
@@ -72,7 +73,8 @@ class Edges:
         self.a, self.b, self.before, self.after = (np.concatenate(x) if x else np.zeros((0, 3)) for x in (a, b, before, after))
 
     def distances(self, points):
-        """[n] signed, positive off the road, of points [n, 3]: in the plane, to the edge that is nearest with heights threefold."""
+        """Returns the signed horizontal distances [n] of points [n, 3] to the nearest edge, positive off the road. The search for the nearest
+    edge multiplies height differences by 3."""
         if not len(self.a):
             return np.full(len(points), -50.0)
         way = (self.b - self.a)[:, :2]
@@ -88,7 +90,7 @@ class Edges:
             beside = neighbors[i]
             start = self.a[i, :2] - beside if begin is None else begin[i, :2]
             its_left = cross(beside, p - start) >= 0
-            # Where the two edges of a corner disagree, the road is inside a turn to the right alone.
+            # If the two edges of a corner disagree, the road is inside only at a turn to the right.
             decides = ends & ~np.isnan(beside[:, 0]) & (its_left != is_left)
             is_left = np.where(decides, sign * cross(way[i], beside) < 0, is_left)
         distance = np.where(is_left, -1, 1) * np.linalg.norm(away, axis=-1)
@@ -96,7 +98,7 @@ class Edges:
 
 
 def centered(values, is_angle=False):
-    """Central differences over the last axis, NaN at both ends."""
+    """Returns central differences over the last axis, NaN at both ends."""
     out = np.full(values.shape, np.nan)
     change = values[..., 2:] - values[..., :-2]
     out[..., 1:-1] = ((change + np.pi) % (2 * np.pi) - np.pi if is_angle else change) / (2 * DT)
@@ -131,14 +133,14 @@ class Reference:
         self.lights = arrays["lights"]
 
     def poses(self, rollouts):
-        """[rollouts, objects, 91, 4]: the recording up to step 10, then the rollouts."""
+        """Returns poses [rollouts, objects, 91, 4]: the recording up to step 10, then the rollouts."""
         order = [list(rollouts.track_ids).index(i) for i in self.ids]
         future = np.concatenate([rollouts.center_m, np.asarray(rollouts.heading_rad)[..., None]], -1).astype(np.float32)[:, order]
         past = np.broadcast_to(self.history[None, :, : START + 1], (len(future), len(self.ids), START + 1, 4))
         return np.concatenate([past, future.astype(float)], 2)
 
     def features(self, poses):
-        """{name: [scored, 80]} of poses [objects, 91, 4]."""
+        """Returns {name: [scored, 80]} from poses [objects, 91, 4]."""
         first = START + 1
         delta = (poses[:, 2:, :3] - poses[:, :-2, :3]) / (2 * DT)
         speed = np.full(poses.shape[:2], np.nan)
@@ -184,7 +186,7 @@ class Reference:
             if other == me or np.isnan(now[other, 0]):
                 continue
             turned = (now[other, 3] - now[me, 3] + np.pi) % (2 * np.pi) - np.pi
-            # Its corners in my frame.
+            # The other's corners in the frame of `me`.
             box = (corners(*now[other, [0, 1, 3]], *self.size[other, :2]) - now[me, :2]) @ np.array([[c, -s], [s, c]])
             gap = box[:, 0].min() - self.size[me, 0] / 2
             half = self.size[me, 1] / 2

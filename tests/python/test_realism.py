@@ -1,4 +1,4 @@
-"""Realism scores: against a second implementation (realism_reference.py), on synthetic scenes and on real ones; files and refusals."""
+"""Tests realism scores against a second implementation (realism_reference.py) on synthetic and real scenes, their files, and errors."""
 
 import os
 import pathlib
@@ -46,7 +46,7 @@ def wandering(scene: pictura.Scenario, count: int, seed: int) -> realism.Rollout
 
 
 def compare(scene: pictura.Scenario, rollouts: realism.Rollouts) -> dict:
-    """Both implementations agree in every feature and every figure."""
+    """Checks that both implementations give equal features and metrics. Returns the score."""
     reference = Reference(scene)
     ids, recorded, simulated = realism.features(scene, rollouts)
     assert ids.tolist() == reference.ids[reference.scored].tolist()
@@ -69,13 +69,13 @@ def compare(scene: pictura.Scenario, rollouts: realism.Rollouts) -> dict:
 
 
 def test_both_implementations_agree_on_random_rollouts(scene):
-    # Without tracks to predict, all that are there are scored.
+    # Without tracks to predict, all tracks that are present at the start are scored.
     all_scored = pictura.Scenario.from_arrays(**scene.to_arrays())
     scores = [compare(scene, wandering(scene, 4, 0)), compare(all_scored, wandering(all_scored, 2, 1)), compare(all_scored, wandering(all_scored, 2, 2))]
     assert [score["road_users"] for score in scores] == [2, 12, 12]
     for score in scores:
         assert 0 < score["realism"] < 1 and score["ade_m"] >= score["min_ade_m"] > 0
-    # Something of everything happens.
+    # Every kind of event occurs.
     for name in ("collision_rate", "off_road_rate", "red_light_rate", "short_time_to_collision_share"):
         assert max(score[name] for score in scores) > 0, name
 
@@ -126,9 +126,9 @@ def test_errors_name_invalid_input(scene, tmp_path):
     good = realism.recorded_rollouts(scene, 1)
     with pytest.raises(pictura.Error, match=f"track {good.track_ids[-1]} is missing"):
         realism.score(scene, realism.Rollouts(good.track_ids[:-1], good.center_m[:, :-1], good.heading_rad[:, :-1]))
-    with pytest.raises(pictura.Error, match="track 99999 is not there"):
+    with pytest.raises(pictura.Error, match="track 99999 is absent"):
         realism.score(scene, good._replace(track_ids=np.append(good.track_ids[:-1], 99999)))
-    with pytest.raises(pictura.Error, match="is there twice"):
+    with pytest.raises(pictura.Error, match="occurs twice"):
         realism.score(scene, good._replace(track_ids=np.append(good.track_ids[:-1], good.track_ids[0])))
     with pytest.raises(pictura.Error, match="expected rollouts of 80 steps, got 79"):
         realism.score(scene, good._replace(center_m=good.center_m[:, :, :79], heading_rad=good.heading_rad[:, :, :79]))

@@ -288,7 +288,7 @@ def test_evaluation_matches_the_command(trained):
     command = os.environ.get("PICTURA_COMMAND")
     folder, done = trained[1], []
     options = {"scenarios": 2, "steps": 40, "agents_per_world": 6, "num_threads": 2, "device": "cpu"}
-    # Sampled actions, since the most likely action of a policy that has hardly learnt may stand still.
+    # Sampled actions, since the most likely action of a policy that has hardly learned may stand still.
     report = pictura.evaluate(
         str(folder / "checkpoint.ckpt"), ["procedural:1"], argmax=False, on_progress=lambda fraction, eta_s: done.append(fraction), **options
     )

@@ -617,7 +617,7 @@ class InstallTorch(Scratch):
 
 
 class JoinWheels(Scratch):
-    """Wheels of the right names whose files hold the names of their builds."""
+    """Wheels with real names whose files contain the names of their builds."""
 
     COPIED = ("join_wheels",)
     NAME = "pictura-1-cp311-cp311-linux_x86_64.whl"

@@ -7,12 +7,12 @@ import urllib.parse
 
 
 def header_of(path):
-    """What a replay's page says before its numbers."""
+    """Returns the header of a replay page, a dict."""
     return json.loads(re.search(r'id="replay-header">(.*?)</script>', path.read_text()).group(1))
 
 
 class Events:
-    """The events of a live page, as they come."""
+    """Reader of the events of a live page."""
 
     def __init__(self, address):
         parts = urllib.parse.urlsplit(address)
@@ -23,7 +23,7 @@ class Events:
         self.type = self.response.headers["Content-Type"]
 
     def next(self, *names):
-        """The data of the next event of one of these names."""
+        """Waits for the next event with one of these names, and returns its data."""
         name = None
         while True:
             line = self.response.readline().decode().rstrip("\n")

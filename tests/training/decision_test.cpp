@@ -147,7 +147,7 @@ TEST(HeldActions, AreStoredInARollout) {
       if (at(rollout.truncated, step) != 0 && step + 1 < rollout.num_steps()) {
         ++num_final;
         EXPECT_NE(at(rollout.values, step + 1), 0) << "of the final observation";
-        EXPECT_EQ(at(rollout.decisions(), step + 1), 0) << "nothing is learnt from a reset";
+        EXPECT_EQ(at(rollout.decisions(), step + 1), 0) << "nothing is learned from a reset";
       }
     }
   }

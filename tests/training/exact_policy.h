@@ -50,7 +50,7 @@ class ExactPolicy final : public Policy {
     const at::NoGradGuard no_grad;
     parameters_[0].value += 0.25;
   }
-  /// Returns a hash of each row that the policy has learnt from since the last call, grouped by calls of forward().
+  /// Returns a hash of each row that the policy has learned from since the last call, grouped by calls of forward().
   std::vector<at::Tensor> take_learnt() { return std::exchange(learnt_, {}); }
 
  private:
@@ -172,7 +172,7 @@ inline void expect_same_driving(const ExactRun& a, const ExactRun& b) {
   EXPECT_EQ(a.simulator_hash, b.simulator_hash);
 }
 
-/// Checks that two runs learnt from the same transitions in the same order. Longer chunks are padded.
+/// Checks that two runs learned from the same transitions in the same order. Longer chunks are padded.
 inline void expect_same_order(const ExactRun& a, const ExactRun& b) {
   for (size_t u = 0; u < a.updates.size(); ++u) {
     SCOPED_TRACE("update " + std::to_string(u + 1));

@@ -403,7 +403,7 @@ TEST_F(Training, ImpairedAgentsAreExcludedFromLearning) {
                                            "simulator.others.inattentive=0.1"});
   EXPECT_EQ(among.slot_steps, plain.slot_steps);
   EXPECT_NEAR(static_cast<double>(among.agent_steps) / static_cast<double>(plain.agent_steps), 0.5, 0.2);
-  // Everything that unimpaired agents did is learnt from, and nothing else.
+  // Training uses all transitions of unimpaired agents, and no others.
   EXPECT_EQ(among.kept_fraction, 1);
   EXPECT_EQ(among.minibatches, (among.agent_steps + 63) / 64);
 }

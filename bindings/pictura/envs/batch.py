@@ -104,7 +104,7 @@ class Batch:
             raise pictura.UsageError(f"actions: expected one of {', '.join(ACTIONS)}; got '{actions}'")
         array = array or ("numpy" if device == "cpu" else "torch")
         if array not in ("numpy", "torch") or (array == "numpy" and device != "cpu"):
-            raise pictura.UsageError(f"array: expected 'numpy' (on the CPU alone) or 'torch', got '{array}' on {device}")
+            raise pictura.UsageError(f"array: expected 'numpy' (only on the CPU) or 'torch', got '{array}' on {device}")
         if num_agents < 1 or num_worlds < 1:
             raise pictura.UsageError(f"expected at least 1 agent and 1 world, got {num_agents} and {num_worlds}")
         loaded = load_maps(maps)

@@ -460,7 +460,7 @@ TEST_F(CudaStreamTest, KernelsBuiltAheadOfTimeDrawTheSame) {
     const test::EnvironmentVariable on("PICTURA_NVRTC", std::nullopt);
     std::string choice;
     make_renderer("cuda", config, &choice);
-    EXPECT_THAT(choice, StartsWith("cuda: asked for; kernels built"));
+    EXPECT_THAT(choice, StartsWith("cuda: requested; kernels built"));
     EXPECT_THAT(choice, HasSubstr("and this rig"));
     const std::vector<uint8_t> at_run_time = bytes_of(Stage(60, 7, config).draw(PixelFormat::f32));
     const test::EnvironmentVariable off("PICTURA_NVRTC", "off");
