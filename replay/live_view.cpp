@@ -96,7 +96,7 @@ struct LiveView::Parts {
     }
   }
 
-  void tell_of_frame() {
+  void send_frame() {
     server.send("frame", [this] { return world.frame(); });
     server.send("look", [this] { return agent_message(); });
   }
@@ -125,13 +125,13 @@ void LiveView::before_step(Span<const Command> commands) { parts_->world.before_
 
 void LiveView::after_step(const StepResult& result) {
   parts_->world.after_step(result);
-  parts_->tell_of_frame();
+  parts_->send_frame();
 }
 
 void LiveView::after_reset(Span<const uint8_t> world_mask) {
   const int64_t step = parts_->world.step();
   parts_->world.after_reset(world_mask);
-  if (parts_->world.step() != step) parts_->tell_of_frame();
+  if (parts_->world.step() != step) parts_->send_frame();
 }
 
 void LiveView::finish() {

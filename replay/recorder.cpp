@@ -213,11 +213,11 @@ struct Recorder::Parts {
 #undef X
   }
 
-  void add_frame(bool begins_anew = false) {
+  void add_frame(bool new_episode = false) {
     const AgentStateView state = simulator.state();
     const SceneBatch& scene = simulator.scene();
     const Span<const AgentBox> boxes = scene.agents.subspan(first_box, num_boxes);
-    const bool begins = begins_anew || replay.episodes.empty() || episode().index != simulator.episode_index()[world];
+    const bool begins = new_episode || replay.episodes.empty() || episode().index != simulator.episode_index()[world];
     if (begins) begin_episode(state, boxes);
     for (int32_t agent = 0; agent < replay.num_agents; ++agent) add_agent(state, boxes, agent, begins);
     const Span<const LightState> lights = scene.light_states.subspan(first_light, replay.num_lights);
@@ -377,7 +377,7 @@ void Recorder::after_reset(Span<const uint8_t> world_mask) {
   parts.check_room();
   parts.take_seed();
   parts.add_no_step();
-  parts.add_frame(/*begins_anew=*/true);
+  parts.add_frame(/*new_episode=*/true);
 }
 
 const Replay& Recorder::recorded() const { return parts_->replay; }

@@ -151,7 +151,7 @@ void visit_words(const Scenario& scenario, const std::string& words, Visit&& vis
   }
 }
 
-bool names_nobody(const std::vector<uint8_t>& mask) { return std::find(mask.begin(), mask.end(), 1) == mask.end(); }
+bool selects_none(const std::vector<uint8_t>& mask) { return std::find(mask.begin(), mask.end(), 1) == mask.end(); }
 
 }  // namespace
 
@@ -232,7 +232,7 @@ std::vector<uint8_t> tracks_selected_by(const Scenario& scenario, const std::str
 
 std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& words) {
   visit_words(scenario, words, [&scenario](const std::string& word, const std::vector<uint8_t>& named) {
-    if (!names_nobody(named)) return;
+    if (!selects_none(named)) return;
     fail_usage("scene {}: expected tracks, got '{}', which selects none of its {}", scenario.id, word, named.size());
   });
   return tracks_selected_by(scenario, words);
@@ -243,7 +243,7 @@ std::vector<uint8_t> tracks_of(const Scenario& scenario, const std::string& word
   for (size_t i = 0; i < mask.size(); ++i) {
     mask[i] &= scenario.valid_of(static_cast<int32_t>(i))[step];
   }
-  if (names_nobody(mask)) {
+  if (selects_none(mask)) {
     fail_usage("'{}': expected a track that is present at step {}, got none", words, step);
   }
   return mask;

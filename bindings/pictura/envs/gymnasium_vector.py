@@ -80,8 +80,8 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._over = self.batch.view(self.batch.simulator.episode_over)
-        self._everybody = self.batch.active
-        self._everybody[:] = True
+        self._all_slots = self.batch.active
+        self._all_slots[:] = True
         self._has_begun = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -124,8 +124,8 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
 
     def _info(self, copy: bool) -> dict[str, Any]:
         info = self.batch.info(copy)
-        everybody = self.batch.copied(self._everybody) if copy else self._everybody
-        return info | {f"_{key}": everybody for key in info}
+        all_slots = self.batch.copied(self._all_slots) if copy else self._all_slots
+        return info | {f"_{key}": all_slots for key in info}
 
 
 class AgentStatistics(gymnasium.vector.VectorWrapper):
