@@ -31,11 +31,11 @@ constexpr std::array<const char*, 3> kRemovalExamples{
     "pictura probe removal agent.safetensors vector.safetensors --out removal",
     "pictura probe removal runs/a/checkpoint.ckpt --map Town01 --scenes 2 --removals 2000 --steps 300 --replay "
     "case.html",
-    "pictura probe removal agent.safetensors --map procedural:1 --agents 40 --removals 1000 --control nobody"};
+    "pictura probe removal agent.safetensors --map procedural:1 --agents 40 --removals 1000 --control unchanged"};
 constexpr std::array<const char*, 3> kPedestrianExamples{
     "pictura probe pedestrian agent.safetensors vector.safetensors --out pedestrian",
     "pictura probe pedestrian runs/a/checkpoint.ckpt --map Town01 --scenes 2 --paths 4 --steps 300",
-    "pictura probe pedestrian agent.safetensors --map procedural:1 --agents 40 --paths 8 --control nobody"};
+    "pictura probe pedestrian agent.safetensors --map procedural:1 --agents 40 --paths 8 --control unchanged"};
 constexpr std::array<const char*, 3> kCornerExamples{
     "pictura probe corner agent.safetensors vector.safetensors --out corner",
     "pictura probe corner runs/a/checkpoint.ckpt --map Town05 --scenes 2 --pairs 20 --driver lane",

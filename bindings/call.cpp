@@ -19,8 +19,8 @@ Processes& processes() {
 }
 
 bool is_forked(std::atomic<pid_t>* process) {
-  pid_t nobody = 0;
-  return !process->compare_exchange_strong(nobody, getpid()) && nobody != getpid();
+  pid_t none = 0;
+  return !process->compare_exchange_strong(none, getpid()) && none != getpid();
 }
 }  // namespace
 

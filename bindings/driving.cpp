@@ -562,7 +562,7 @@ sample_steps: steps between sampled states.
 batch: number of cases that are computed together.
 removals: total number of cases.
 range_m: maximum distance of a user in metres.
-control: control experiment: 'none', 'nobody', 'permuted' or 'untrained' (docs/explanation/probes.md).
+control: control experiment: 'none', 'unchanged', 'permuted' or 'untrained' (docs/explanation/probes.md).
 cases_file: CSV file to write, with one row for each case.
 replay: page *.html to write, which plays the scene of one case and shows its images with and without the user
 (docs/reference/replay.md).
@@ -587,7 +587,7 @@ paths: total number of paths, each in one state.
 hider_range_m: maximum distance in metres of the vehicle behind which a path begins.
 min_speed_mps: minimum forward speed of the ego.
 height_m: height of the pedestrian.
-control: control experiment: 'none', 'nobody' or 'untrained' (docs/explanation/probes.md).
+control: control experiment: 'none', 'unchanged' or 'untrained' (docs/explanation/probes.md).
 cases_file: CSV file to write, with one row for each point of each path.
 The other arguments are those of probe_removal().
 

@@ -56,6 +56,14 @@ void ParameterVisitor::numbers_by_name(const NamedOption& option, std::vector<st
   });
 }
 
+std::string ParameterVisitor::current_name(const NamedOption& option, const std::string& name) {
+  if (!option.renamed.old_name || name != option.renamed.old_name) return name;
+  const std::string warning = fmt::format("{}: '{}' is deprecated: use '{}'", option.name, name, option.renamed.name);
+  // Where warnings are errors, the call raises.
+  if (PyErr_WarnEx(PyExc_DeprecationWarning, warning.c_str(), 1) != 0) throw py::error_already_set();
+  return option.renamed.name;
+}
+
 std::string signature_of(const py::cpp_function& function) {
   const auto text = py::cast<std::string>(function.attr("__doc__"));
   return text.substr(text.find('('), text.find('\n') - text.find('('));

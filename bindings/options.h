@@ -118,9 +118,11 @@ class ParameterVisitor {
   const std::vector<Parameter>& parameters() const { return parameters_; }
 
  private:
+  /// Returns the current name of a choice. For its old name, raises DeprecationWarning.
+  static std::string current_name(const NamedOption& option, const std::string& name);
   template <typename Enum>
   static Enum chosen(const NamedOption& option, const std::string& name, Span<const char* const> names) {
-    return static_cast<Enum>(index_of_word(option.name, name, names));
+    return static_cast<Enum>(index_of_word(option.name, current_name(option, name), names));
   }
   template <typename T, typename Set>
   void add(const NamedOption& option, const T& value, const Set& set) {

@@ -7,6 +7,7 @@
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/make_simulator.h"
 #include "pictura/common/pixel_samples.h"
+#include "pictura/common/support/messages.h"
 #include "pictura/common/support/suggestion.h"
 
 namespace pictura {
@@ -17,6 +18,14 @@ CLI::Validator one_of(const std::vector<std::string>& names) {
     return fmt::format("expected one of {}; got '{}'{}", fmt::join(names, ", "), text, suggestion(text, names));
   };
   return {complaint, ""};
+}
+
+std::function<std::string(std::string)> renaming(const std::string& flag, const RenamedChoice& renamed) {
+  return [flag, renamed](const std::string& text) -> std::string {
+    if (text != renamed.old_name) return text;
+    print_message("warning: {}: '{}' is deprecated: use '{}'\n", flag, text, renamed.name);
+    return renamed.name;
+  };
 }
 
 void add_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out) {

@@ -31,9 +31,10 @@ class FlagAdder {
     const auto choose = [&value, names, name = option.name](const std::string& chosen) {
       value = static_cast<Enum>(index_of_word(name, chosen, names));
     };
-    command_->add_option_function<std::string>(option.flag, choose, option.help)
-        ->check(one_of({names.begin(), names.end()}))
-        ->default_str(names[static_cast<int>(value)]);
+    CLI::Option* const added = command_->add_option_function<std::string>(option.flag, choose, option.help)
+                                   ->check(one_of({names.begin(), names.end()}))
+                                   ->default_str(names[static_cast<int>(value)]);
+    if (option.renamed.old_name) added->transform(renaming(option.flag, option.renamed));
   }
 
  private:

@@ -55,7 +55,8 @@ std::string about(const RemovalCase& one, RemovalControl control) {
 }
 
 std::string about(const PedestrianPoint& point, const PedestrianPath& path, PedestrianControl control) {
-  if (control == PedestrianControl::nobody) return fmt::format("control: no pedestrian is shown to agent {}", path.ego);
+  if (control == PedestrianControl::unchanged)
+    return fmt::format("control: no pedestrian is shown to agent {}", path.ego);
   return fmt::format("a pedestrian is shown to agent {}: {:.1f} m away, of which its cameras see {:.0f} %", path.ego,
                      point.distance_m, 100 * point.visible_share);
 }
@@ -66,7 +67,7 @@ std::string about(const CornerState& one, int32_t removed, CornerControl control
                   one.ego, one.distance_m);
   if (control != CornerControl::permuted) return hidden;
   return fmt::format("{}; control: {} is removed instead", hidden,
-                     removed < 0 ? "nobody" : fmt::format("agent {}", removed));
+                     removed < 0 ? "no agent" : fmt::format("agent {}", removed));
 }
 
 // Returns options of an evaluation that simulates a case's scene again, with the scene's driver.
@@ -143,7 +144,7 @@ void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions
   const PedestrianPoint& point = results.points[number];
   const PedestrianPath& path = results.paths[point.path];
   ReplayCase probed{.what = about(point, path, results.control)};
-  if (results.control != PedestrianControl::nobody) {
+  if (results.control != PedestrianControl::unchanged) {
     probed.inserted = replay_box(point.pedestrian);
     const auto first = results.points.begin() + path.first_point;
     for (auto at = first; at != first + path.num_points; ++at) {

@@ -209,7 +209,7 @@ def probe_pedestrian(policies: collections.abc.Sequence[str | collections.abc.Ca
     hider_range_m: maximum distance in metres of the vehicle behind which a path begins.
     min_speed_mps: minimum forward speed of the ego.
     height_m: height of the pedestrian.
-    control: control experiment: 'none', 'nobody' or 'untrained' (docs/explanation/probes.md).
+    control: control experiment: 'none', 'unchanged' or 'untrained' (docs/explanation/probes.md).
     cases_file: CSV file to write, with one row for each point of each path.
     The other arguments are those of probe_removal().
     
@@ -235,7 +235,7 @@ def probe_removal(policies: collections.abc.Sequence[str | collections.abc.Calla
     batch: number of cases that are computed together.
     removals: total number of cases.
     range_m: maximum distance of a user in metres.
-    control: control experiment: 'none', 'nobody', 'permuted' or 'untrained' (docs/explanation/probes.md).
+    control: control experiment: 'none', 'unchanged', 'permuted' or 'untrained' (docs/explanation/probes.md).
     cases_file: CSV file to write, with one row for each case.
     replay: page *.html to write, which plays the scene of one case and shows its images with and without the user
     (docs/reference/replay.md).

@@ -8,10 +8,16 @@
 
 namespace pictura {
 
+/// Old name of a choice. Commands and Python accept it with a warning until the next version.
+struct RenamedChoice {
+  const char *old_name = nullptr, *name = nullptr;
+};
+
 struct NamedOption {
   std::string name;                                        // name in Python
   const char *flag = nullptr, *help = nullptr;             // in commands; null: no flag
   double low = 0, high = std::numeric_limits<int>::max();  // range of numbers
+  RenamedChoice renamed{};                                 // old name of a choice
 };
 
 /// Changes of a key's value that a resumed run accepts. reported: any change, with a notice.

@@ -238,7 +238,7 @@ class PedestrianProbe {
                                  .distance_m = length(one.path.point_m(i) - eye_m),
                                  .visible_share = trial.shares[i]});
       pairs.push_back({.world = world, .slot = slot});
-      if (options_.control != PedestrianControl::nobody) pairs.back().inserted = pedestrian;
+      if (options_.control != PedestrianControl::unchanged) pairs.back().inserted = pedestrian;
     }
     results_.paths.push_back(std::move(path));
     quota_.take(scene, 1);

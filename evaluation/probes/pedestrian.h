@@ -28,9 +28,11 @@ void visit_options(PedestrianOptions& options, Visitor&& v) {
   v.value({"min_speed_mps", "--min-speed", "Minimum forward speed of the ego in m/s", -100, 100},
           options.min_speed_mps);
   v.value({"height_m", "--height", "Height of the pedestrian in m; vehicles are 1.5 m high", 0.1, 3}, options.height_m);
-  v.choice({"control", "--control",
-            "Control experiment: nobody shows no pedestrian; untrained uses policies with random weights in the same "
-            "states"},
+  v.choice({.name = "control",
+            .flag = "--control",
+            .help = "Control experiment: unchanged shows no pedestrian; untrained uses policies with random weights in "
+                    "the same states",
+            .renamed = kRenamedControl},
            options.control, kPedestrianControlNames);
 }
 

@@ -14,10 +14,10 @@ namespace pictura {
 
 enum class PedestrianControl : uint8_t {
   none,
-  nobody,     // control: no pedestrian is inserted, so no response may change
+  unchanged,  // control: no pedestrian is inserted, so no response may change
   untrained,  // control: the policies have fresh weights
 };
-constexpr std::array<const char*, 3> kPedestrianControlNames{"none", "nobody", "untrained"};
+constexpr std::array<const char*, 3> kPedestrianControlNames{"none", "unchanged", "untrained"};
 
 enum class PathPhase : uint8_t { hidden, seen, hidden_again };
 constexpr std::array<const char*, 3> kPathPhaseNames{"hidden", "seen", "hidden again"};

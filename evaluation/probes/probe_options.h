@@ -30,6 +30,9 @@ struct ProbeOptions {
   int batch = 4096;       // cases computed together, rounded up to whole passes; changes no result
 };
 
+/// Old name of the control in which worlds are unchanged.
+constexpr RenamedChoice kRenamedControl{"nobody", "unchanged"};
+
 /// Visits the options of all probes except policies, worlds and devices.
 template <typename Visitor>
 void visit_options(ProbeOptions& probe, Visitor&& v) {

@@ -113,7 +113,7 @@ class RemovalProbe {
   }
 
   int32_t hidden_of(const std::vector<DrawnCase>& pairs, const DrawnCase& one, RandomStream* random) const {
-    if (options_.control == RemovalControl::nobody) return -1;
+    if (options_.control == RemovalControl::unchanged) return -1;
     if (options_.control != RemovalControl::permuted) return one.facts.user;
     std::vector<int32_t> others;
     for (const DrawnCase& pair : pairs) {

@@ -24,10 +24,13 @@ void visit_options(RemovalOptions& options, Visitor&& v) {
            "Total number of cases; in a case, one road user is hidden from one ego in one state", 1},
           options.removals);
   v.value({"range_m", "--range", "Maximum distance in m from the ego to the road user", 1, 1000}, options.range_m);
-  v.choice({"control", "--control",
-            "Control experiment: nobody hides no road user; permuted hides a random other road user near the ego; "
-            "untrained uses policies with random weights in the same states"},
-           options.control, kRemovalControlNames);
+  v.choice(
+      {.name = "control",
+       .flag = "--control",
+       .help = "Control experiment: unchanged hides no road user; permuted hides a random other road user near the "
+               "ego; untrained uses policies with random weights in the same states",
+       .renamed = kRenamedControl},
+      options.control, kRemovalControlNames);
 }
 
 /// Drives the worlds that evaluate() would drive with options.worlds. All worlds have the first policy's population,

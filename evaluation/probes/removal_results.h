@@ -14,11 +14,11 @@ namespace pictura {
 /// Road user that is hidden in a case.
 enum class RemovalControl : uint8_t {
   none,       // the case's user
-  nobody,     // control: no road user is hidden, so no response may change
+  unchanged,  // control: no road user is hidden, so no response may change
   permuted,   // control: another road user near the ego, drawn at random; none if there is no other
   untrained,  // control: the case's user; the policies have fresh weights
 };
-constexpr std::array<const char*, 4> kRemovalControlNames{"none", "nobody", "permuted", "untrained"};
+constexpr std::array<const char*, 4> kRemovalControlNames{"none", "unchanged", "permuted", "untrained"};
 
 /// One road user hidden from one ego in one state. Agent indices are within their world.
 struct RemovalCase {

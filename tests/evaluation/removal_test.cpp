@@ -106,7 +106,7 @@ TEST_F(Removal, HidingObservedPartnersChangesVectorPolicies) {
 }
 
 TEST_F(Removal, HidingNoAgentChangesNothing) {
-  const RemovalResults control = controlled(RemovalControl::nobody);
+  const RemovalResults control = controlled(RemovalControl::unchanged);
   ASSERT_EQ(control.cases.size(), 600u);
   for (const RemovalCase& one : control.cases) EXPECT_EQ(one.hidden, -1);
   for (size_t i = 0; i < control.responses.size(); ++i) {

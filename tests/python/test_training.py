@@ -342,15 +342,18 @@ def test_removal_matches_the_command(trained, tmp_path):
     for wrong in ({"replay": "case.png"}, {"case": 3}, {"replay": str(page), "case": 10**6}):
         with pytest.raises(pictura.UsageError, match="replay|case"):
             pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], **wrong, **few)
-    nobody = pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="nobody", **options)
-    assert all(row["abs_d_value"] in (0, None) for row in nobody["rows"])
+    unchanged = pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="unchanged", **options)
+    assert unchanged["control"] == "unchanged" and all(row["abs_d_value"] in (0, None) for row in unchanged["rows"])
+    with pytest.warns(DeprecationWarning, match="control: 'nobody' is deprecated: use 'unchanged'"):
+        renamed = pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="nobody", **options)
+    assert renamed["control"] == "unchanged" and renamed["rows"] == unchanged["rows"]
     untrained_cases = tmp_path / "untrained.csv"
     untrained = pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="untrained", cases_file=str(untrained_cases), **options)
     assert untrained["control"] == "untrained" and untrained["cases"] == number and untrained["policy"][0]["untrained_hash"] != policy["policy_hash"]
     assert policy["untrained_hash"] is None and untrained["policy"][0]["policy_hash"] == policy["policy_hash"]
     theirs_of_state, mine = ([line.split(",")[:14] for line in each.read_text().splitlines()] for each in (untrained_cases, cases))
     assert theirs_of_state == mine and untrained_cases.read_text() != cases.read_text()
-    with pytest.raises(pictura.UsageError, match="none, nobody, permuted, untrained"):
+    with pytest.raises(pictura.UsageError, match="none, unchanged, permuted, untrained"):
         pictura.probe_removal([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="some")
     theirs = probed_by_command("removal", folder, tmp_path / "out", options)
     assert theirs["rows"] == report["rows"]
@@ -375,11 +378,11 @@ def test_pedestrian_matches_the_command(trained, tmp_path):
     assert sum(row["cases"] for row in report["rows"] if row["phase"]) == report["cases"]
     lines = cases.read_text().splitlines()
     assert len(lines) == 1 + report["cases"] and lines[0].startswith("case,path,scene,map,driver,step,ego")
-    nobody = pictura.probe_pedestrian([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="nobody", **options)
-    assert all(row["abs_d_value"] == 0 for row in nobody["rows"])
+    unchanged = pictura.probe_pedestrian([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="unchanged", **options)
+    assert all(row["abs_d_value"] == 0 for row in unchanged["rows"])
     untrained = pictura.probe_pedestrian([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="untrained", **options)
     assert untrained["cases"] == report["cases"] and untrained["rows"] != report["rows"]
-    with pytest.raises(pictura.UsageError, match="none, nobody, untrained, got 'some'"):
+    with pytest.raises(pictura.UsageError, match="none, unchanged, untrained, got 'some'"):
         pictura.probe_pedestrian([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="some")
     theirs = probed_by_command("pedestrian", folder, tmp_path / "out", options)
     assert theirs["rows"] == report["rows"]
@@ -408,7 +411,7 @@ def test_corner_matches_the_command(trained, tmp_path):
         pictura.probe_corner([str(folder / "checkpoint.ckpt")], ["procedural:1"], pairs=0)
     assert report["control"] == "none"
     with pytest.raises(pictura.UsageError, match="none, permuted, untrained"):
-        pictura.probe_corner([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="nobody")
+        pictura.probe_corner([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="unchanged")
     untrained = pictura.probe_corner([str(folder / "checkpoint.ckpt")], ["procedural:1"], control="untrained", **options)
     assert untrained["pairs"] == 1 and untrained["rows"] != report["rows"]
     assert untrained["rows"][0]["speed_curve_mps"][0] == hidden["speed_curve_mps"][0]
