@@ -169,7 +169,8 @@ void print_report(const EvaluateOptions& options, const Reports& reports, const 
 }
 
 void print_groups(const std::vector<InfractionGroup>& groups) {
-  print_result("{:10} {:>7} {:>7}  {}\n", "infraction", "count", "share", "of vehicles, the most frequent");
+  print_result("{:10} {:>7} {:>7}  {}\n", "infraction", "count", "share",
+               "most frequent kinds of vehicles' infractions");
   std::map<std::string, int64_t> totals;
   for (const InfractionGroup& group : groups) totals[group.kind] += group.count;
   for (const auto& [kind, total] : totals) {

@@ -241,7 +241,7 @@ void add_map_command(CLI::App& app) {
   command->add_flag("--strict", arguments->strict,
                     "Reject every fault of the file, including faults that are repaired by default");
   command->add_flag("--lenient")->group("");  // option of earlier versions; it is rejected with a hint
-  command->add_flag("--json", arguments->json, "Print one JSON object; its key mends lists every repaired fault");
+  command->add_flag("--json", arguments->json, "Print one JSON object; its key 'mends' lists every repaired fault");
   command->add_flag("--full", arguments->full, "With --json: list every element with its position in the file");
   command->footer(
       "Examples:\n  pictura map Town01 --json\n  pictura map procedural:7 --png town.png\n"

@@ -278,7 +278,7 @@ class PyRenderer {
         try {
           renderer_->render(scene.batch(), span, some, stream_);
         } catch (const Error& error) {
-          fail("of the views {} to {}: {}", begin, begin + count - 1, error.what());
+          fail("views {} to {}: {}", begin, begin + count - 1, error.what());
         }
       });
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();

@@ -48,10 +48,10 @@ std::string about(const RemovalCase& one, RemovalControl control) {
   if (one.hidden < 0) return fmt::format("control: no agent is hidden from agent {}", one.ego);
   if (control == RemovalControl::permuted)
     return fmt::format("control: agent {} is hidden from agent {} instead of agent {}", one.hidden, one.ego, one.user);
-  return fmt::format("agent {} is hidden from agent {}: a {}{} {:.1f} m away, {}", one.user, one.ego,
+  return fmt::format("agent {} is hidden from agent {}: a {}{} {:.1f} m away{}", one.user, one.ego,
                      one.user_halted ? "halted " : "", to_string(one.user_class), one.distance_m,
-                     one.is_in_frame() ? fmt::format("of which its cameras see {:.0f} %", 100 * one.visible_share)
-                                       : "which no camera sees");
+                     one.is_in_frame() ? fmt::format(", of which its cameras see {:.0f} %", 100 * one.visible_share)
+                                       : ", which no camera sees");
 }
 
 std::string about(const PedestrianPoint& point, const PedestrianPath& path, PedestrianControl control) {

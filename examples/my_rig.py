@@ -23,7 +23,7 @@ def main() -> None:
         print(f"{camera.name}: images {list(images.camera(i).shape)}, agent 0 sees {np.count_nonzero(seen)} others")
     pairs = np.array([(0, other) for other in range(1, 24)], np.int32)
     coverage = renderer.visibility(simulator.scene, simulator.views, pairs)
-    print(f"of {np.isfinite(coverage).sum()} in its frames, {np.count_nonzero(coverage > 0.5)} are at least half visible")
+    print(f"{np.isfinite(coverage).sum()} others are in its frames, {np.count_nonzero(coverage > 0.5)} of them at least half visible")
 
 
 if __name__ == "__main__":

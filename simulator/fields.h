@@ -61,13 +61,13 @@ constexpr int kNumWaypoints = 3;
   X(steer_rad, float, 1, 0, "front wheel angle, positive to the left")                                           \
   X(jerk_long_mps3, float, 1, 0, "realised in the last step")                                                    \
   X(jerk_lat_mps3, float, 1, 0, "")                                                                              \
-  X(length_m, float, 1, 0, "of the box")                                                                         \
+  X(length_m, float, 1, 0, "length of the box")                                                                  \
   X(width_m, float, 1, 0, "")                                                                                    \
   X(height_m, float, 1, 0, "")                                                                                   \
   X(lane, int32_t, 1, -1, "current lane, -1 none")                                                               \
   X(lane_offset_m, float, 1, 0, "signed, positive to the left of the centre line")                               \
   X(lane_angle_rad, float, 1, 0, "heading less the lane's direction, in [-pi, pi]")                              \
-  X(speed_limit_mps, float, 1, 0, "of the current lane")                                                         \
+  X(speed_limit_mps, float, 1, 0, "limit of the current lane")                                                   \
   X(waypoint_x_m, float, 3, 0, "the goal chain; passed waypoints stay until it is renewed")                      \
   X(waypoint_y_m, float, 3, 0, "")                                                                               \
   X(waypoint_z_m, float, 3, 0, "")                                                                               \

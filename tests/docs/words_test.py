@@ -2,9 +2,10 @@
 
 Run by ctest: python3 words_test.py [unittest arguments]. Also
     python3 words_test.py --report      prints the words of each page and all violations, also on exempt pages
-    python3 words_test.py --comments    prints forbidden turns in comments and docstrings of sources
+    python3 words_test.py --comments    prints forbidden turns in comments, docstrings, messages and help texts of sources
 """
 
+import ast
 import collections
 import fnmatch
 import io
@@ -37,6 +38,11 @@ EXEMPT = {
     "CONTRIBUTING.md": {"page"},
 }
 GENERATED = {"build", "carry", "out", "runs"}
+# Comment, raw string, string or character of C++.
+CPP_TOKEN = re.compile(
+    r"""//[^\n]*|/\*.*?\*/|R"(?P<mark>[^(\s"]*)\((?P<raw>.*?)\)(?P=mark)"|"(?P<text>(?:[^"\\\n]|\\.)*)"|(?<!\w)'(?:[^'\\\n]|\\[^\n]+?)'""",
+    re.DOTALL,
+)
 SOURCES = ("*.h", "*.cpp", "*.cu", "*.cuh", "*.py", "*.pyi", "*.cmake", "*CMakeLists.txt", "scripts/*")
 
 
@@ -153,6 +159,48 @@ def comments(path):
     return [(number, line) for number, line, _ in joined]
 
 
+def string_literals(path):
+    """Returns [(line, text)] of the strings of a C++ or Python file. Joins adjacent strings; an f-string's values become "{}"."""
+    source = path.read_text(errors="replace")
+    if path.suffix in (".h", ".cpp", ".cu", ".cuh"):
+        return cpp_strings(source)
+    if path.suffix in (".py", ".pyi") or source.startswith("#!/usr/bin/env python"):
+        return list(python_strings(ast.parse(source)))
+    return []
+
+
+def cpp_strings(source):
+    found, end = [], None
+    for match in CPP_TOKEN.finditer(source):
+        text = match["raw"] if match["raw"] is not None else match["text"]
+        if text is None:
+            continue
+        if match["raw"] is None:
+            text = text.replace("\\n", "\n\n").replace('\\"', '"')
+        if found and not source[end : match.start()].strip():
+            found[-1] = (found[-1][0], found[-1][1] + text)
+        else:
+            found.append((source.count("\n", 0, match.start()) + 1, text))
+        end = match.end()
+    return found
+
+
+def python_strings(node):
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.JoinedStr):
+            yield child.lineno, "".join(part.value if isinstance(part, ast.Constant) else "{}" for part in child.values)
+        elif isinstance(child, ast.Constant) and isinstance(child.value, str) and not isinstance(node, ast.Expr):
+            yield child.lineno, child.value
+        else:
+            yield from python_strings(child)
+
+
+def messages(path):
+    """Returns [(line, text)] of the paragraphs of a source file's strings that have several words."""
+    found = [(line, " ".join(part.split("\n"))) for line, text in string_literals(path) for part in text.split("\n\n")]
+    return [(line, text) for line, text in found if re.search(r"\w\s+\w", text)]
+
+
 def sources():
     """Returns the paths of the repository's sources, also of untracked ones."""
     top = [path for path in sorted(ROOT.iterdir()) if path.name[0] != "." and path.name not in GENERATED]
@@ -164,7 +212,9 @@ def comment_violations():
     found = []
     for path in sources():
         if path != pathlib.Path(__file__).resolve():
-            for line, text in comments(path):
+            # Strings of tests are data, names of assertions and quoted messages.
+            texts = comments(path) + ([] if name_of(path).startswith("tests/") else messages(path))
+            for line, text in texts:
                 found += [f"{name_of(path)}:{line}: '{turn}': {instead}" for turn, instead in turns_in(text)]
     return found
 
@@ -231,6 +281,19 @@ class Rules(unittest.TestCase):
             self.assertEqual([text for _, text in comments(source)], ["One comment.", "of a", "of b and c"])
 
 
+    def test_turns_in_messages_are_found(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for name, source in {
+                "a.cpp": "const char *a = \"nobody\", *b = \"one\\n\"\n  \"whose weights are drawn \"\n  \"anew\"; // x \" y\nint c = 1'000; char d = '\"';\n",
+                "b.cpp": 'auto help = R"(A\nfirst paragraph.\n\nIts weights are drawn\nanew.)";\n',
+                "c.py": 'a = "nobody"\nfail(f"whose weights of {a} are drawn "\n     "anew")\n',
+            }.items():
+                path = pathlib.Path(folder) / name
+                path.write_text(source)
+                turns = [turn for _, text in messages(path) for turn, _ in turns_in(text)]
+                self.assertEqual(turns, ["anew"], name)
+
+
 class Comments(unittest.TestCase):
     maxDiff = 0  # the message lists the violations
 
@@ -261,7 +324,7 @@ class Pages(unittest.TestCase):
 if __name__ == "__main__":
     if "--comments" in sys.argv:
         found = comment_violations()
-        print("\n".join([*found, f"{len(found)} turns in comments"]))
+        print("\n".join([*found, f"{len(found)} turns in comments and messages"]))
     elif "--report" in sys.argv:
         report()
     else:
