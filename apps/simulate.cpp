@@ -138,7 +138,7 @@ struct SimulationRun {
   SpawnReport spawned;  // in the first episode, like the counts by class
   std::array<int64_t, kNumAgentClasses> of_class{};
   int steps = 0;
-  // Durations: all work except filming, recording and serving; and the simulator alone.
+  // Durations: all work except filming, recording and serving; and only the simulator's steps.
   double drive_s = 0, simulate_s = 0;
 };
 

@@ -152,7 +152,7 @@ void ImageArray::make_storage() {
 }
 
 void ImageArray::make_resolve_program() {
-  // Asks for the number of samples, because the driver may use more samples than requested.
+  // Reads the number of samples, because the driver may use more samples than requested.
   GLint samples = 1;
   if (samples_.multisample > 1) gl_.GetTextureLevelParameteriv(color_, 0, GL_TEXTURE_SAMPLES, &samples);
   resolve_program_ = make_program(

@@ -1,4 +1,4 @@
-// Controllers by name.
+// Creates controllers from their names.
 #pragma once
 
 #include <memory>

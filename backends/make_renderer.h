@@ -1,4 +1,4 @@
-// Renderers by name.
+// Creates renderers from their names.
 #pragma once
 
 #include <memory>

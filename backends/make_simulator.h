@@ -1,4 +1,4 @@
-// Simulators by name.
+// Creates simulators from their names.
 #pragma once
 
 #include <memory>

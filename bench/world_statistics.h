@@ -12,7 +12,7 @@ namespace pictura {
 
 struct WorldStatisticsOptions {
   int episodes = 100;  // each is a world's first episode
-  int agents = 120;    // per world of the random policy; the lane-keeping agent is alone among parked cars
+  int agents = 120;    // per world of the random policy; a world of the lane keeper has one agent and parked cars
   uint64_t seed = 0;
   int num_threads = 0;  // 0: all
   std::function<void(const std::string& phase)> on_progress;

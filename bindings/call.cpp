@@ -50,7 +50,7 @@ void for_each_class(const py::module_& module, F&& f) {
 void reject_uninitialized_objects(const py::module_& module) {
   for_each_class(module, [](const py::object&, py::detail::type_info* info) {
     info->operator_new = [](size_t) -> void* {
-      fail("expected an object created by calling its class, got an object created by __new__ alone");
+      fail("expected an object created by calling its class, got an object created only by __new__");
     };
   });
 }

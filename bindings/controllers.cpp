@@ -1,4 +1,4 @@
-// pictura.Controller: controllers by name, shared controllers, and their commands.
+// pictura.Controller: named and shared controllers, and their commands.
 #include "pictura/backends/make_controller.h"
 #include "pictura/bindings/python_simulator.h"
 #include "pictura/simulator/controllers/shared_control.h"

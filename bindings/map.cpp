@@ -235,10 +235,10 @@ not exist.)")
           py::doc("PROJ string of the file's coordinates; may be empty."))
       .def_property_readonly(
           "facts", [](const Map& self) { return facts_of(self.road()->facts); },
-          py::doc("Counts and lengths by name, as `pictura map` prints them."))
+          py::doc("Dict of counts and lengths, as `pictura map` prints them."))
       .def(
           "arrays", [](const Map& self) { return arrays_of(*self.road()); },
-          R"(Returns copies of the network's geometry as NumPy arrays by name. Lengths are in metres.
+          R"(Returns copies of the network's geometry as a dict of NumPy arrays. Lengths are in metres.
 
 lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length. lane_point_range int32 [lanes, 2]: the
 half-open range of each lane's points. lane_type uint8 [lanes]: indices into pictura.LANE_TYPES. lane_links int32:

@@ -184,7 +184,7 @@ Raises pictura.UsageError if the world or agent does not exist or the simulator 
           "Records a policy's logits [12] and value for the followed agent, which belong to the next step.")
       .def_property_readonly("num_steps", &PyRecorder::num_steps, "Number of recorded steps and resets.")
       .def_property_readonly(
-          "metrics", [](const PyRecorder& self) { return dict_of(self.metrics()); }, "Counts and sums so far, by name.")
+          "metrics", [](const PyRecorder& self) { return dict_of(self.metrics()); }, "Dict of counts and sums so far.")
       .def(
           "write", &PyRecorder::write, py::arg("path"), py::arg("policy") = "",
           R"(Ends the recording and writes it to a file, completely or not at all: *.html, a page for any browser, or *.mcap, for

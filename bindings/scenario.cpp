@@ -327,15 +327,15 @@ Raises pictura.UsageError if the scene does not have this step.)")
           py::doc("Index of the self-driving car's track; None if the file does not mark it."))
       .def_property_readonly(
           "facts", [](const RecordedScene& self) { return facts_of_scene(*self.scenario()); },
-          py::doc(
-              "Counts and lengths of the map, and counts of tracks and lights, by name, as `pictura map` prints them."))
+          py::doc("Dict of the map's counts and lengths, and of counts of tracks and lights, as `pictura map` prints "
+                  "them."))
       .def_property_readonly(
           "notes", [](const RecordedScene& self) { return notes_of(*self.scenario()); },
           py::doc("Elements that the conversion of the file dropped or changed: a tuple (kind, count, place of the "
                   "first) for each kind."))
       .def(
           "tracks", [](const RecordedScene& self) { return tracks_of_scene(*self.scenario()); },
-          R"(Returns copies of the tracks as NumPy arrays by name.
+          R"(Returns copies of the tracks as a dict of NumPy arrays.
 
 id int64 [tracks]: ids in the file. type uint8 [tracks]: indices into pictura.TRACK_TYPES. size_m float32 [tracks, 3]:
 length, width, height. valid bool [tracks, steps]: whether the state is recorded. position_m float32 [tracks, steps, 3]:
@@ -381,8 +381,8 @@ Raises pictura.UsageError for another file extension, and pictura.Error if the f
 Returns uint8 [height, width, 3], with north at the top. Sizes are from 16 to 8192 px.)")
       .def(
           "inverse_actions", inverse_actions_of, py::arg("num_threads") = 0,
-          R"(Computes the actions with which the simulator's dynamics follow the recording most closely. Returns NumPy arrays by
-name.
+          R"(Computes the actions with which the simulator's dynamics follow the recording most closely. Returns a dict of
+NumPy arrays.
 
 The arrays are [tracks, steps from start_step on], with a value for the step after each state. actions int32: the
 action. is_followed bool: whether the states before and after the step are recorded. error_m float32: distance between

@@ -51,7 +51,7 @@ std::string text_of(const Shape& shape) {
   return "[" + text + "]";
 }
 
-/// Reads the arrays of a dict by name.
+/// Reader of the arrays in a dict.
 class ArrayReader {
  public:
   ArrayReader(std::string name, py::dict arrays, const std::vector<std::string>& known)

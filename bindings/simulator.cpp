@@ -259,11 +259,11 @@ queries raise the error in check() or a later call.)");
 void define_arrays(py::class_<PySimulator>* simulator) {
   (*simulator)
       .def_property_readonly("observations", &PySimulator::observations,
-                             py::doc("Observations of the current state, arrays [slots, ...] by name: ego, partners, "
+                             py::doc("Observations of the current state, a dict of arrays [slots, ...]: ego, partners, "
                                      "lanes, boundaries, controls, walls, set_counts, conditioning, waypoints."))
       .def_property_readonly(
           "state", &PySimulator::state,
-          py::doc("Fields of the agents by name, read-only arrays [slots] or [slots, numbers per agent]."))
+          py::doc("Fields of the agents, a dict of read-only arrays [slots] or [slots, numbers per agent]."))
       .def_property_readonly("scene", &PySimulator::scene, py::doc("Scene of all worlds, for renderers."))
       .def_property_readonly(
           "views", [](PySimulator& self) { return self.lend_structs<View>(self.simulator().views(), "views"); },
@@ -299,7 +299,7 @@ void define_totals_and_copies(py::class_<PySimulator>* simulator) {
             return report_of(
                 self.calls().run("spawn_report", [&] { return self.simulator().spawn_report(self.stream()); }));
           },
-          "Returns the numbers of requested, spawned, refused, entered and left agents and of parked cars, by name. "
+          "Returns a dict of the numbers of requested, spawned, refused, entered and left agents and of parked cars. "
           "Waits for the stream.")
       .def(
           "totals",
@@ -307,7 +307,7 @@ void define_totals_and_copies(py::class_<PySimulator>* simulator) {
             return dict_of(
                 self.calls().run("totals", [&] { return SimulatorTotals(self.simulator().totals(self.stream())); }));
           },
-          "Returns counts and sums since construction, by name. `reward_terms` is a dict. Waits for the stream.")
+          "Returns a dict of counts and sums since construction. `reward_terms` is a dict. Waits for the stream.")
       .def(
           "state_hash",
           [](PySimulator& self) {

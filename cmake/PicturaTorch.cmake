@@ -24,7 +24,7 @@ if(NOT PICTURA_WITH_TORCH STREQUAL OFF)
     add_library(pictura_torch INTERFACE)
     target_include_directories(pictura_torch SYSTEM INTERFACE
       ${torch_root}/include ${torch_root}/include/torch/csrc/api/include)
-    # By name, not by path: the wheel's folder also contains a libgomp, which the program then loads.
+    # Libraries are linked by name, not by path: the wheel's folder also contains a libgomp, which the program then loads.
     target_link_libraries(pictura_torch INTERFACE -L${torch_root}/lib -ltorch_cpu -lc10)
     # A wheel must not contain paths of the build machine. It finds torch in its environment (bindings/CMakeLists.txt).
     if(NOT SKBUILD)

@@ -17,8 +17,8 @@ struct SceneHistorySize {
 };
 
 /// History of scenes in the memory of one device. World w of step s is world s * worlds + w of the history. Agents and
-/// lights are numbered likewise. put() and gather() neither allocate nor wait. The rules of Renderer (renderer.h) for
-/// devices and streams apply.
+/// lights are numbered in the same way. put() and gather() neither allocate nor wait. The rules of Renderer
+/// (renderer.h) for devices and streams apply.
 class SceneHistory {
  public:
   /// Throws Error if num_steps is less than 1, or if the history has more worlds, agents or lights than int32_t can

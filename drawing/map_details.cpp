@@ -44,7 +44,7 @@ void paint_arrows(GroundPen& pen, const RoadMap& map, const Lane& lane) {
 
 void paint_lane_number(GroundPen& pen, const RoadMap& map, size_t index) {
   const Lane& lane = map.lanes[index];
-  // In front of the arrow at the lane's middle, if an arrow is there.
+  // Position before the lane's middle, where the lane may have an arrow.
   const Vector2d position = pose_at(map.points_of(lane), 0.5 * lane.length_m) * Vector2d{-14 / pen.px_per_m(), 0};
   if (!pen.is_visible(position, 1)) return;
   const bool on_dark = is_drivable(lane.type);

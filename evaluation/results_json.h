@@ -13,7 +13,7 @@ namespace pictura {
 Json to_json(const EvaluationSetting& setting);
 EvaluationSetting setting_from(const Json& json);
 
-/// Returns the counts of a ScenarioCounts or SceneCounts by name.
+/// Returns an object with the counts of a ScenarioCounts or SceneCounts.
 template <typename Counts>
 Json counts_json(const Counts& counts) {
   Json json;

@@ -72,7 +72,7 @@ Text text_of(RepairKind kind) {
     case RepairKind::contrary_link:
       return {"links to a road's end that is linked elsewhere and does not touch", "left out"};
     case RepairKind::dangling_link: return {"links of lanes at a road end without a road link", "left out"};
-    case RepairKind::unlike_link: return {"links of lanes of unlike types", "left out"};
+    case RepairKind::unlike_link: return {"links of lanes of different types", "left out"};
     case RepairKind::opposed_link: return {"links of lanes of opposite traffic", "left out"};
     case RepairKind::distant_link: return {"links of lanes that do not touch", "left out"};
     case RepairKind::missing_junction: return {"references to junctions that do not exist", "left out"};
@@ -83,7 +83,7 @@ Text text_of(RepairKind kind) {
     case RepairKind::missing_controller: return {"references to controllers that do not exist", "left out"};
     case RepairKind::uncontrolled_light:
       return {"lights without a controller",
-              "at junctions, similar headings share a phase; elsewhere each light cycles alone"};
+              "at junctions, similar headings share a phase; elsewhere each light has its own cycle"};
     case RepairKind::unlisted_light: return {"lights that are in no controller of their junction", "left out"};
     case RepairKind::laneless_light: return {"lights without a lane", "left out"};
     case RepairKind::missing_link:

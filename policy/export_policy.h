@@ -31,7 +31,7 @@ struct ExportOptions {
 
 /// Reads a policy file, and writes it to `out` as write_policy() does. options.size also scales patches and minimum
 /// line widths (policy/patch_spread.h). Throws Error naming a file that cannot be read or written, or lacks the average
-/// that options.average asks for. Throws UsageError naming `size` if the policy cannot have that size.
+/// that options.average selects. Throws UsageError naming `size` if the policy cannot have that size.
 ExportedPolicy export_policy(const std::string& policy_path, const std::string& out, const ExportOptions& options);
 
 }  // namespace pictura

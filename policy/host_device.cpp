@@ -8,8 +8,8 @@ namespace pictura {
 
 Device open_learning_device(const Config& config, int) {
   constexpr const char* kRemedy =
-      "this build has no torch, and computes policies on the CPU: install torch beside a "
-      "build for it (pip install pictura[train]), or set it to \"cpu\" or \"auto\"";
+      "this build has no torch, and computes policies on the CPU: install a build "
+      "with torch (pip install pictura[train]), or set it to \"cpu\" or \"auto\"";
   PICTURA_CHECK(!config.run.device.starts_with("cuda"), "run.device: \"{}\": {}", config.run.device, kRemedy);
   PICTURA_CHECK(config.simulator.backend != "cuda", "simulator.backend: \"cuda\": {}", kRemedy);
   return {};

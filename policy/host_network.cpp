@@ -88,7 +88,7 @@ struct Norm {
   }
 };
 
-/// Reader of a file's parameters by name.
+/// Reader of a file's named parameters.
 class ParameterReader {
  public:
   explicit ParameterReader(const StoredPolicy& saved) : saved_(saved) {}

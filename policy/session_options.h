@@ -33,7 +33,7 @@ struct SessionOptions {
   std::optional<LightHeads> light_heads;
 };
 
-/// Visits the options that callers can set by name, except lights.
+/// Visits the named options, except lights.
 template <typename Visitor>
 void visit_options(SessionOptions& options, Visitor&& v) {
   v.value({"num_threads"}, options.num_threads);

@@ -1,4 +1,4 @@
-// Fields of agents by name, type and shape.
+// Names, types and shapes of agents' fields.
 #pragma once
 
 #include <string_view>

@@ -18,7 +18,7 @@ constexpr std::array<const char*, 2> kOverlappingWords{"replay", "drive"}, kOthe
 constexpr std::array<const char*, 3> kLateWords{"replay", "drive", "absent"},
     kInfractionWords{"halt", "leave", "drive_on"};
 
-/// Rule that can be changed by name: its description, and functions that parse and format its value.
+/// Named rule that options can change: its description, and functions that parse and format its value.
 struct Rule {
   SceneRule about;
   void (*set)(const std::string& name, const std::string& value, SceneProtocol* out);

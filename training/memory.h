@@ -28,7 +28,7 @@ struct NetworkSize {
 };
 NetworkSize network_size(const Config& config, Device device);
 
-/// Throws Error if one rank needs more than `memory_bytes` of the device. It first checks the network alone (with
+/// Throws Error if one rank needs more than `memory_bytes` of the device. It first checks the network (with
 /// train.forward_chunk transitions), then the network together with the rank's agents. The error names the settings,
 /// and how many transitions or agents would fit.
 void check_memory(const Config& config, Device device, int64_t memory_bytes, int num_ranks = 1);

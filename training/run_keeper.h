@@ -26,7 +26,7 @@ class RunKeeper {
   /// overwritten run stays until the first save(). Returns the recent updates for the log.
   std::vector<RecentUpdate> begin(Run* run);
 
-  /// Whether the configuration asks for a checkpoint now.
+  /// Whether a checkpoint is due after this update, by train.checkpoint_every or train.checkpoint_minutes.
   bool is_due(const Run& run) const;
   /// Saves checkpoint.ckpt and keeps older ones, unless this update is already saved.
   void save(const Run& run, const std::vector<RecentUpdate>& recent);

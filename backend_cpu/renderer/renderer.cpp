@@ -74,7 +74,7 @@ class CpuRenderer final : public Renderer {
       const bool is_drawn = static_cast<std::size_t>(query.view) < views.size();
       for (std::size_t camera = 0; is_drawn && camera < cameras_.size(); ++camera) {
         ImageRequest image = request(scene, views[query.view], camera);
-        image.culls_occluded = false;  // occluded faces of the agent count in its weight alone
+        image.culls_occluded = false;  // occluded faces count when the agent is drawn alone
         drawer.prepare(image);
         drawer.accumulate_visibility(query.agent, &seen);
       }

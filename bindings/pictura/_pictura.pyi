@@ -157,7 +157,7 @@ class Map:
         ...
     def arrays(self) -> dict:
         """
-        Returns copies of the network's geometry as NumPy arrays by name. Lengths are in metres.
+        Returns copies of the network's geometry as a dict of NumPy arrays. Lengths are in metres.
         
         lane_points float32 [points, 6]: x, y, z, heading in radians, width, arc length. lane_point_range int32 [lanes, 2]: the
         half-open range of each lane's points. lane_type uint8 [lanes]: indices into pictura.LANE_TYPES. lane_links int32:
@@ -176,7 +176,7 @@ class Map:
     @property
     def facts(self) -> dict:
         """
-        Counts and lengths by name, as `pictura map` prints them.
+        Dict of counts and lengths, as `pictura map` prints them.
         """
     @property
     def geo_reference(self) -> str:
@@ -269,8 +269,8 @@ class Scenario(Map):
         """
     def inverse_actions(self, num_threads: typing.SupportsInt | typing.SupportsIndex = 0) -> dict:
         """
-        Computes the actions with which the simulator's dynamics follow the recording most closely. Returns NumPy arrays by
-        name.
+        Computes the actions with which the simulator's dynamics follow the recording most closely. Returns a dict of
+        NumPy arrays.
         
         The arrays are [tracks, steps from start_step on], with a value for the step after each state. actions int32: the
         action. is_followed bool: whether the states before and after the step are recorded. error_m float32: distance between
@@ -307,7 +307,7 @@ class Scenario(Map):
         """
     def tracks(self) -> dict:
         """
-        Returns copies of the tracks as NumPy arrays by name.
+        Returns copies of the tracks as a dict of NumPy arrays.
         
         id int64 [tracks]: ids in the file. type uint8 [tracks]: indices into pictura.TRACK_TYPES. size_m float32 [tracks, 3]:
         length, width, height. valid bool [tracks, steps]: whether the state is recorded. position_m float32 [tracks, steps, 3]:
@@ -338,7 +338,7 @@ class Scenario(Map):
     @property
     def facts(self) -> dict:
         """
-        Counts and lengths of the map, and counts of tracks and lights, by name, as `pictura map` prints them.
+        Dict of the map's counts and lengths, and of counts of tracks and lights, as `pictura map` prints them.
         """
     @property
     def format(self) -> str:
@@ -983,7 +983,7 @@ class Simulator:
         """
     def spawn_report(self) -> dict:
         """
-        Returns the numbers of requested, spawned, refused, entered and left agents and of parked cars, by name. Waits for the stream.
+        Returns a dict of the numbers of requested, spawned, refused, entered and left agents and of parked cars. Waits for the stream.
         """
     def state_hash(self) -> int:
         """
@@ -1014,7 +1014,7 @@ class Simulator:
         """
     def totals(self) -> dict:
         """
-        Returns counts and sums since construction, by name. `reward_terms` is a dict. Waits for the stream.
+        Returns a dict of counts and sums since construction. `reward_terms` is a dict. Waits for the stream.
         """
     @property
     def agent_of_slot(self) -> Array:
@@ -1070,7 +1070,7 @@ class Simulator:
     @property
     def observations(self) -> dict:
         """
-        Observations of the current state, arrays [slots, ...] by name: ego, partners, lanes, boundaries, controls, walls, set_counts, conditioning, waypoints.
+        Observations of the current state, a dict of arrays [slots, ...]: ego, partners, lanes, boundaries, controls, walls, set_counts, conditioning, waypoints.
         """
     @property
     def scene(self) -> Scene:
@@ -1083,7 +1083,7 @@ class Simulator:
     @property
     def state(self) -> dict:
         """
-        Fields of the agents by name, read-only arrays [slots] or [slots, numbers per agent].
+        Fields of the agents, a dict of read-only arrays [slots] or [slots, numbers per agent].
         """
     @property
     def stream(self) -> int:
@@ -1143,7 +1143,7 @@ class Recorder:
     @property
     def metrics(self) -> dict:
         """
-        Counts and sums so far, by name.
+        Dict of counts and sums so far.
         """
     @property
     def num_steps(self) -> int:

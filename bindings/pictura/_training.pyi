@@ -36,7 +36,7 @@ class PolicySession:
         """
         Returns logits float32 [batch, 12] and values float32 [batch], on the session's device.
         
-        observations: arrays [batch, ...] by name, like pictura.Simulator.observations.
+        observations: dict of arrays [batch, ...], like pictura.Simulator.observations.
         scene, views, renderer: needed by policies that read images. views is [batch], and the renderer is from make_renderer().
         is_drawn: uint8 [batch], 0 where images are black instead of drawn; default: all images are drawn.
         Raises pictura.Error, which names a missing or invalid argument.
@@ -107,7 +107,7 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
         width_px: Image width of the paper's rig; 0: as in training.
         height_px: Image height of the paper's rig; 0: as in training.
         backbone: Path of the program in policy.backbone, if it has moved since training.
-        conditioning: Numbers by name, which replace values of the configuration's [evaluate.conditioning].
+        conditioning: Dict of numbers that replace values of the configuration's [evaluate.conditioning].
         average: Whether to use the average of weights in the checkpoint.
         decision_steps: Steps for which each action is held; 0: as in training.
         camera_severity: Severity of randomized cameras, 0 to 2 (docs/explanation/cameras.md).
@@ -158,7 +158,7 @@ def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, p
     scenes: files, folders, or 'FILE#K' for scene K of a file.
     protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents'.
     controller: driver instead of the policy: 'log', 'inverse', 'idm', 'idm_lanes', 'random' or 'idle'.
-    control, start_step, steps, densities (shares of road users that remain), rules (values by name): settings that replace
+    control, start_step, steps, densities (shares of road users that remain), rules (dict of values): settings that replace
     those of the protocol (docs/explanation/evaluation.md).
     first_scene, num_scenes: range of scenes; num_scenes 0: all from the first on.
     rollouts: file for the rollouts of the protocol 'simagents', in the format of the Waymo sim-agents challenge.

@@ -177,7 +177,7 @@ def _read_run(folder: str, groups_seeds: bool) -> _Run:
     config_path = f"{folder}/config.toml"
     _need(
         os.path.exists(config_path),
-        f"{config_path}: expected beside progress.csv, to find runs that differ only in their seed; --group none does not need the file",
+        f"{config_path}: expected in the folder of progress.csv, to find runs that differ only in their seed; --group none does not need the file",
     )
     try:
         config = tomllib.loads(pathlib.Path(config_path).read_text(encoding="utf-8"))
@@ -804,7 +804,7 @@ def _matplotlib(what: str) -> Any:
         import matplotlib.style
     except ImportError as error:
         raise MissingMatplotlib(
-            f"{what}: not drawn, since {sys.executable} has no Matplotlib ({error}): pip install 'pictura[plot]', or matplotlib alone"
+            f"{what}: not drawn, since {sys.executable} has no Matplotlib ({error}): pip install 'pictura[plot]' or matplotlib"
         ) from None
     return matplotlib
 

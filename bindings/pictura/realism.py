@@ -33,7 +33,7 @@ class Rollouts(NamedTuple):
 
 
 def score(scene: _pictura.Scenario, rollouts: Rollouts, *, version: str = "2025") -> dict[str, Any]:
-    """Returns the scores of one scene by name, like one entry of "scenes" in the output of `pictura score --json`.
+    """Returns a dict of one scene's scores, like one entry of "scenes" in the output of `pictura score --json`.
 
     Names are realism, likelihoods, ade_m, min_ade_m, collision_rate, comfortable_share, progress and more. A score is
     None if the scene does not define it. Raises pictura.Error, which names a missing or unknown track.
@@ -42,7 +42,7 @@ def score(scene: _pictura.Scenario, rollouts: Rollouts, *, version: str = "2025"
 
 
 def features(scene: _pictura.Scenario, rollouts: Rollouts) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Returns the ids of the scored road users, their recorded features by name, and the features in each rollout.
+    """Returns the ids of the scored road users, a dict of their recorded features, and a dict of the features in each rollout.
 
     Recorded features are float64 [1, scored, 80], features of rollouts float64 [rollouts, scored, 80]. A step without a
     value is NaN.

@@ -29,13 +29,13 @@ enum class Evaluation { counts, replaced };
 
 /// A key of a configuration file.
 struct NamedKey {
-  NamedKey(const char* its_name) : name(its_name) {}                // NOLINT: most keys are a name alone
+  NamedKey(const char* its_name) : name(its_name) {}                // NOLINT: most keys have only a name
   NamedKey(std::string its_name, Resume at_resume = Resume::fixed,  // NOLINT
            Evaluation in_evaluation = Evaluation::counts)
       : name(std::move(its_name)), resume(at_resume), evaluation(in_evaluation) {}
   NamedKey(std::string its_name, Evaluation in_evaluation)
       : NamedKey(std::move(its_name), Resume::fixed, in_evaluation) {}
-  operator const std::string&() const { return name; }  // NOLINT: most visitors need no more
+  operator const std::string&() const { return name; }  // NOLINT: most visitors need only the name
   /// Option named by the part of the key after its section.
   operator NamedOption() const { return {name.substr(name.rfind('.') + 1)}; }  // NOLINT
 

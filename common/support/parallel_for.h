@@ -20,8 +20,8 @@ constexpr int kMaxThreads = 1024;
 int resolve_num_threads(int num_threads);
 
 /// Calls call(body, number) with number 0 in this thread, and with other numbers in up to num_threads - 1 other
-/// threads. After this thread's call, waits for the threads that have begun; no others begin. Nested calls run in this
-/// thread alone.
+/// threads. After this thread's call, waits for the threads that have begun; no others begin. Nested calls run
+/// only in this thread.
 void run_on_threads(int num_threads, void (*call)(void* body, int number), void* body);
 
 /// Calls body(i), or body(i, thread), for i in [0, count), on at most num_threads threads (0: all). Bodies must not

@@ -1,4 +1,4 @@
-// Controllers that run on the host, by name.
+// Creates controllers that run on the host from their names.
 #pragma once
 
 #include <memory>

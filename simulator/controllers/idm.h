@@ -50,7 +50,7 @@ struct FollowedPath {
 /// fork, the path takes the straightest successor on which routes may continue, else the straightest of all. At a lane
 /// without successors, it changes to the nearest lane beside it with successors. If there is no room for the change,
 /// the path ends so that the front bumper stops before the lane's end. The bumper is front_m ahead of the reference
-/// point. If `lane` is -1, the path is the pose alone.
+/// point. If `lane` is -1, the path consists only of the pose.
 FollowedPath path_along_lanes(const MapView& map, int32_t lane, Vec3 position_m, float heading_rad, float front_m);
 
 enum class IdmPaths {

@@ -198,7 +198,7 @@ int32_t LaneKeepingAgent::action_of(Driving how, const Motion& now, size_t place
   return pursuing_action(now, place, how == Driving::pursues ? points()[place].speed_mps : 0);
 }
 
-/// Whether the agent stays on the road, with a margin, if it takes this action and then drives as `how` says. The
+/// Whether the agent stays on the road, with a margin, if it takes this action and then drives in the way `how`. The
 /// prediction ends at the horizon, when the agent has braked to rest, or when it has left through an exit.
 bool LaneKeepingAgent::stays_on_road(Motion now, int32_t action, Driving how) const {
   constexpr float kHorizon_m = 20;

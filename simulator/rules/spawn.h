@@ -142,7 +142,7 @@ PICTURA_HD inline LanePose pose_of(const WorldView& world, int agent, RoutePoint
   return walks(world, agent) ? pose_on_walk(world.map, at.lane, at.s_m) : pose_on_lane(world.map, at.lane, at.s_m);
 }
 
-/// Returns a point a random distance ahead, or farther if a parked car is there.
+/// Returns a point a random distance ahead, or farther if a parked car occupies that point.
 template <typename ThreadGroup = SingleThread>
 PICTURA_HD RoutePoint next_walk_waypoint(const WorldView& world, int agent, RoutePoint at, RandomStream* random_inout,
                                          const ThreadGroup& group = {}) {

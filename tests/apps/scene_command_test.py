@@ -189,7 +189,7 @@ with tempfile.TemporaryDirectory() as name:
         report = json.loads(run(*sim_agents, "--rollouts", rollouts, "--json", command="evaluate").stdout)
         assert report["rules"]["rollouts"] == "32" and report["rows"][0]["vehicle_episodes"] == 32 * 8, report
         assert 32 * 12 * 4 * 320 < rollouts.stat().st_size < 32 * 12 * (4 * 320 + 30), rollouts.stat().st_size
-        # Their realism, at once and from the file.
+        # Realism of the rollouts, computed during the evaluation and from the file.
         report = json.loads(run(*sim_agents, "--realism", "2025", "--json", command="evaluate").stdout)["realism"]
         score = json.loads(run(rollouts, "--scenes", scene, "--json", command="score").stdout)
         assert score == report and 0 < score["realism"] < 1 and score["scored"] == 1 and len(score["likelihoods"]) == 10, score

@@ -1,6 +1,6 @@
 """The search of the documentation's site works on pages that are opened from disk. Needs chromium.
 
-python3 site_search_test.py; the built site, build/docs/site, is tested if it is there.
+Usage: python3 site_search_test.py. Also tests the built site, build/docs/site, if it exists.
 """
 
 import json

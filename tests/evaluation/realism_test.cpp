@@ -228,7 +228,7 @@ TEST(RealismScenes, ScoreTheRecordingUnderRollouts) {
   EXPECT_NEAR(half.min_ade_m, 0, 1e-3);
   EXPECT_NEAR(half.progress, 0.75, 1e-3);
   EXPECT_EQ(half.comfort, 1) << "constant speeds";
-  // From 8 to 4 m/s at once, after 4 s: over 0.7 s that is 5.7 m/s^2.
+  // The speed drops from 8 to 4 m/s in one step after 4 s: over 0.7 s that is 5.7 m/s^2.
   for (size_t step = 40; step < 80; ++step)
     mixed.rollouts[1][step].x_m = static_cast<float>(8 + 0.8 * 40 + 0.4 * double(step - 39));
   EXPECT_EQ(scene.score(mixed, version).comfort, 0.5);

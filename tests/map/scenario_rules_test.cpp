@@ -270,7 +270,7 @@ TEST(DrivableArea, SidesAtEdgesAndCorners) {
   EXPECT_TRUE(area.side_of({5, 0, 0}).is_on_road);
   EXPECT_TRUE(area.side_of({9.9f, 9.9f, 0}).is_on_road);
   EXPECT_FALSE(area.side_of({10.1f, 0, 0}).is_on_road);
-  // Beyond corners, where the side of one of the two edges alone would be wrong.
+  // Beyond corners, where the side of only one of the two edges would be wrong.
   EXPECT_FALSE(area.side_of({11, 10.5f, 0}).is_on_road);
   EXPECT_FALSE(area.side_of({10.5f, 11, 0}).is_on_road);
   EXPECT_FALSE(area.side_of({1.9f, 0, 0}).is_on_road);

@@ -63,7 +63,7 @@ def test_seeds_of_one_configuration_are_a_mean_with_a_band(tmp_path):
     assert len(goals(*town, other, group="none").facts["lines"]) == 3
     os.remove(f"{other}/config.toml")
     assert goals(other, group="none").panels[0].series[0].name == "other"
-    expect_refused("other/config.toml: expected beside progress.csv", goals, other)
+    expect_refused("other/config.toml: expected in the folder of progress.csv", goals, other)
 
 
 def test_a_mean_has_a_gap_at_missing_values(tmp_path):

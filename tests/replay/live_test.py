@@ -157,7 +157,7 @@ class Http(Served):
         while events.next("status")["driven"] != driven:
             pass
         first = events.next("frame")["tracks"]
-        # 4 m/s3 along and to the left, until the acceleration is there: action 11, as 1 + 11.
+        # 4 m/s3 along and to the left, until that acceleration is reached: action 11, as 1 + 11.
         self.assertEqual(first[actions][driven], 12)
         frames = []
         for _ in range(8):

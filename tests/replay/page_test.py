@@ -52,7 +52,7 @@ def png_pixels(png):
 
 
 class Recorded:
-    """A replay as read by this file, which follows docs/reference/replay.md alone."""
+    """Reader of a replay that follows only docs/reference/replay.md."""
 
     def __init__(self, path):
         page = pathlib.Path(path).read_text()

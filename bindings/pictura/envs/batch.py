@@ -230,7 +230,7 @@ class Batch:
         self.simulator.reset(world_mask, seed)
 
     def step(self, actions: Any) -> dict[str, Any]:
-        """Advances the simulator by one step. Returns its results by name, as views that the next step overwrites."""
+        """Advances the simulator by one step. Returns a dict of its results, as views that the next step overwrites."""
         result = self.simulator.step(self.action_indices(actions))
         return self.results(result)
 
@@ -246,7 +246,7 @@ class Batch:
         return self._state["status"] == STATUS_ACTIVE
 
     def info(self, copy: bool = True) -> dict[str, Any]:
-        """Returns the infos of every slot after a step, by name. docs/reference/environment.md lists them.
+        """Returns a dict of the infos of every slot after a step. docs/reference/environment.md lists them.
 
         Without `copy` the arrays except "active" are views of the simulator's memory.
         """

@@ -67,7 +67,7 @@ class DriveParallelEnv(ParallelEnv):
         return self.action_spaces[self.possible_agents[self._slot(agent)]]
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict, dict]:
-        """Starts an episode. Returns (observations, infos) of the live agents by name."""
+        """Starts an episode. Returns (observations, infos), dicts with the live agents' names as keys."""
         if seed is not None:
             self._random = np.random.default_rng(seed)
         for _ in range(100):
@@ -81,7 +81,7 @@ class DriveParallelEnv(ParallelEnv):
         raise pictura.Error("reset: no agent found a place in 100 episodes: expected a map or options with more room")
 
     def step(self, actions: dict[str, Any]) -> tuple[dict, dict, dict, dict, dict]:
-        """Advances the world by one step. actions: the action of every live agent, by name.
+        """Advances the world by one step. actions: dict from each live agent's name to its action.
 
         Returns (observations, rewards, terminations, truncations, infos) of the agents that acted or entered. Raises
         pictura.Error if the action of a live agent is missing.

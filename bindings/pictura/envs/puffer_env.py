@@ -40,7 +40,7 @@ class DrivePufferEnv(_Base):
         maps: One or several maps, as names or pictura.Map. World i uses maps[i % len(maps)].
         num_agents: Number of agents in each world.
         num_worlds: Number of worlds: independent copies of the simulation.
-        buf: PufferLib's buffers by name; None: the environment allocates buffers.
+        buf: Dict of PufferLib's buffers; None: the environment allocates buffers.
         seed: Seed of all random numbers until a reset with another seed.
         options: Arguments of pictura.envs.Batch and of pictura.Simulator.
 

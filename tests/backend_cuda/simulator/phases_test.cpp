@@ -187,7 +187,7 @@ TEST(Phases, FollowRecords) {
   const std::vector<WorldSpec> worlds{
       scene_world(*maps[0], 0, 0), scene_world(*maps[1], 1, 1), {2, 20, 2}, scene_world(*maps[0], 0, 3)};
   expect_same(config, maps, worlds, 160, 9, /*by_commands=*/true);
-  expect_same(config, maps, worlds, 60, 10);  // actions alone take over all agents
+  expect_same(config, maps, worlds, 60, 10);  // actions without commands take over all agents
 }
 
 TEST(Phases, FollowRecordsOfReplayedTracks) {

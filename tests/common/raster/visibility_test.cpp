@@ -230,7 +230,7 @@ ScreenFace plane_face(uint32_t object_id, float inverse_depth_0, Vec2 gradient =
 }
 
 TEST(Order, FacesInOnePlaneAreOrderedByObject) {
-  // The two planes differ by rounding alone, in either direction.
+  // The two planes differ only by rounding, in either direction.
   auto never = [](uint32_t, uint32_t) { return false; };
   for (const float noise : {0.0f, 1e-7f, -1e-7f}) {
     for (const Vec2 tilt : {Vec2{}, Vec2{0.01f, 0.002f}}) {
