@@ -21,7 +21,7 @@ def on_page_markdown(markdown, page, **_):
 
 def as_python_markdown(markdown):
     lines, in_code = [], False
-    block = ""  # what the lines since the last empty one are: text, an item's text, a table, or code
+    block = ""  # kind of the lines since the last empty line: text, an item's text, a table, or code
     items = []  # columns at which the text of the open items begins, outermost first
     for line in markdown.split("\n"):
         text = line.lstrip(" ")

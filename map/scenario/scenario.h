@@ -28,7 +28,7 @@ struct SavedMotion {
   float speed_mps = 0;  // signed, along the heading
 };
 
-/// What the file states about the controller of a track.
+/// Controller of a track, according to the file.
 enum class RecordedControl : uint8_t {
   unstated,
   controllable,  // a policy may drive the track

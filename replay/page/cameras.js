@@ -1,6 +1,6 @@
-// Images of any agent's cameras at any step, drawn with WebGL2: a counterpart of the renderer for images that the file
-// does not hold. docs/explanation/image.md has the rules, backend_gl/ the same method for OpenGL; pixels are means of
-// up to 8x8 samples.
+// Images of any agent's cameras at any step, drawn with WebGL2: a counterpart of the renderer, for images that the file
+// does not contain. docs/explanation/image.md has the rules; backend_gl/ uses the same method with OpenGL. A pixel is the
+// mean of up to 8x8 samples.
 
 const NEAR_M = 0.1, RANGE_M = 120, MAX_PIECE_M = 10, MAX_MITRE = 4, LIGHT_RADIUS_M = 0.5, LIGHT_SIDES = 24, RIG_BODY_M = 4.5;
 const STRIP_RANKS = [2, 3, 1, 0];  // lane mark, road edge, crosswalk, stop line: the lowest rank lies above the others
@@ -155,7 +155,7 @@ function addStrips({ width_m, color, points }, faces) {
 
 // Returns right, down and forward of a camera on its body.
 function axesOf({ yaw_rad, pitch_rad, roll_rad }) {
-  const turns = [  // about x, y and z, one after the other
+  const turns = [  // rotations about x, y and z, in this order
     ([x, y, z]) => { const c = Math.cos(roll_rad), s = Math.sin(roll_rad); return [x, c * y - s * z, s * y + c * z]; },
     ([x, y, z]) => { const c = Math.cos(-pitch_rad), s = Math.sin(-pitch_rad); return [c * x + s * z, y, c * z - s * x]; },
     ([x, y, z]) => { const c = Math.cos(yaw_rad), s = Math.sin(yaw_rad); return [c * x - s * y, s * x + c * y, z]; },
@@ -295,7 +295,7 @@ class CameraView {
   }
 
   // Draws an agent's cameras at a frame: copies the image of each into the 2D context of its size. `hidden` agents are
-  // not drawn, `added` road users are: bodies with positions.
+  // not drawn, road users in `added` are: bodies with positions.
   draw(agent, frame, { hidden = [], added = [] }, contexts) {
     const { gl, replay, header } = this, body = replay.body(agent, frame), pose = replay.pose(agent, frame);
     if (gl.isContextLost()) throw new Error("its WebGL2 context was lost");

@@ -13,6 +13,6 @@ function policyName({ policy }) {
   const names = policy.split("/"), isOfRun = /^(checkpoint|policy)\./.test(names.at(-1)) && names.length > 1;
   return names.at(isOfRun ? -2 : -1);
 }
-// Name of a world of its map: evaluations number their worlds from 2^31, all with one seed.
+// Name of a world. Evaluations number the worlds of a map from 2^31, all with one seed.
 const FIRST_SCENARIO = 2 ** 31;
 const worldName = header => header.global_world >= FIRST_SCENARIO ? `scenario ${header.global_world - FIRST_SCENARIO}` : `seed ${header.seed}`;

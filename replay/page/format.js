@@ -53,7 +53,7 @@ class NumberReader {
   }
   get isAtEnd() { return this.at === this.bytes.length; }
   many(count) { return Array.from({ length: count }, () => this.next()); }
-  // Reads `columns` columns, one after the other, each through all frames.
+  // Reads `columns` columns in order. A column contains all frames.
   columns(columns, frames, order) {
     // Each number takes at least a byte, which is checked before memory is allocated for a corrupted count.
     if (columns * frames > this.bytes.length) throw new Damaged("its numbers are truncated");
@@ -176,7 +176,7 @@ class Replay {
   light(light, frame) { return this.lights[light * this.stride + frame]; }
   isFollowed(agent) { return agent === this.followed; }
   imagesOf(frame) { return this.images.frame(frame); }
-  // Whether the file holds the images of an agent's cameras.
+  // Whether the file contains the images of an agent's cameras.
   hasImages(agent, frame) { return agent === this.followed && Boolean(this.images) && frame < this.images.frames; }
   // Returns the road user of a probe's case, if an agent's case is shown: whether it is inserted, and the change of the
   // images that removes or adds it.
@@ -251,7 +251,7 @@ class Images {
   group(group) {
     const frames = this.groups.get(group) || this.unpack(group);
     this.groups.delete(group);
-    this.groups.set(group, frames);  // as the most recently used
+    this.groups.set(group, frames);  // moves the group to the end, as the most recently used
     if (this.groups.size > 4) this.groups.delete(this.groups.keys().next().value);
     return frames;
   }

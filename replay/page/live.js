@@ -115,12 +115,12 @@ class LiveConnection {
   constructor(on) {
     Object.assign(this, { on, state: "connecting", paused: false, pace: 1, driven: -1, mine: -1, isMine: false, held: new Set(), sending: Promise.resolve() });
   }
-  // Resolves with the replay once the world has been described; rejects if it will not be.
+  // Resolves with the replay once the server has described the world; rejects if it cannot.
   begin() {
     return new Promise((resolve, reject) => {
       const source = this.source = new EventSource("events");
       const giveUp = error => { this.close(); reject(error); };
-      // In order, although unpacking the first message takes time.
+      // Processes messages in order, because unpacking the first message takes time.
       let work = Promise.resolve();
       const listen = (name, act) => source.addEventListener(name, event => {
         work = work.then(() => act(JSON.parse(event.data))).catch(error => this.replay ? this.on.fault(error) : giveUp(error));

@@ -143,7 +143,7 @@ function show(replay, live) {
   function fillMetrics() {
     const m = replay.header.metrics;
     const shown = [["km", m.km_driven.toFixed(1)], ["goals", m.goals_reached], ["collisions", m.collisions], ["off road", m.off_road], ["red lights", m.red_light], ["walls", m.wall_contacts]];
-    // Numbers count agents that act; in a recording that is only played none does.
+    // Numbers count agents that act. In a recording that is only played, no agent acts.
     if (!live && m.agent_steps === 0) { byId("metrics").replaceChildren(make("li", "as recorded: no agent acts")); return; }
     byId("metrics").replaceChildren(...shown.map(([name, value]) => {
       const item = make("li");

@@ -53,7 +53,7 @@ class Timeline {
       canvas.width = Math.round(width * ratio);
       canvas.height = Math.round(height * ratio);
       const repaint = (picture, paint) => {
-        picture.width = canvas.width;  // this clears it
+        picture.width = canvas.width;  // setting the size clears the canvas
         picture.height = canvas.height;
         const context = picture.getContext("2d");
         context.scale(ratio, ratio);
