@@ -19,6 +19,17 @@ class Usage(CommandCase):
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertIn(f"pictura {command}", result.stdout)
 
+    def test_old_names_of_choices_are_accepted_with_a_warning(self):
+        if not has_torch():
+            self.skipTest("this build has no torch")
+        for kind in ("removal", "pedestrian"):
+            for control, warning in (("nobody", "warning: --control: 'nobody' is deprecated: use 'unchanged'\n"), ("unchanged", "")):
+                result = run("probe", kind, self.folder / "no.ckpt", "--control", control, "--out", self.folder / "out")
+                self.assertEqual(result.returncode, 1, result.stderr)
+                self.assertIn("no.ckpt: no such file", result.stderr)
+                self.assertTrue(result.stderr.startswith(warning or "error"), result.stderr)
+        self.assert_refused(2, "expected one of none, unchanged, untrained; got 'nothing'", "probe", "pedestrian", "no.ckpt", "--control", "nothing")
+
     def test_numbers_that_are_not_finite_or_out_of_range_are_refused(self):
         line_floor = ("render", "procedural:1", "--out", self.folder, "--line-floor")
         self.assert_bad_numbers_are_refused(

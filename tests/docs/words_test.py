@@ -274,7 +274,7 @@ class Rules(unittest.TestCase):
     def test_comments_are_found(self):
         path = pathlib.Path(__file__)
         self.assertIn(' Rules that do not hold'.strip(), " ".join(text for _, text in comments(path)))
-        self.assertTrue(any("each rule finds" in text for _, text in comments(path)))
+        self.assertTrue(any("Each rule finds" in text for _, text in comments(path)))
         with tempfile.TemporaryDirectory() as folder:
             source = pathlib.Path(folder) / "a.h"
             source.write_text("// One\n// comment.\nint a;  // of a\nint b;  // of b\n        // and c\n")

@@ -166,7 +166,7 @@ TEST_F(Pedestrian, HiddenPedestriansChangeNothingForCamerasAndMuchForVectors) {
 }
 
 TEST_F(Pedestrian, AnAbsentPedestrianChangesNothing) {
-  const PedestrianResults control = controlled(PedestrianControl::nobody);
+  const PedestrianResults control = controlled(PedestrianControl::unchanged);
   ASSERT_EQ(control.points.size(), results().points.size());
   for (size_t i = 0; i < control.responses.size(); ++i) {
     EXPECT_TRUE(control.responses[i].is_unchanged()) << i;
