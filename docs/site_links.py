@@ -1,4 +1,5 @@
-"""For mkdocs, which reads pages otherwise than GitHub in three ways:
+"""For mkdocs: orders the search's results by kinds of pages, and reads pages as GitHub does, from which mkdocs differs in
+three ways:
 
 - links to files outside of docs/ become the names of these files, since the site does not hold them;
 - a list or a table needs an empty line before it, which pages that are read as files go without;
@@ -8,10 +9,16 @@
 import re
 import textwrap
 
+# Factors of scores in the search: explanations, and the page that lists all keys, come before pages that mention a word.
+# Pages for developers and histories come last.
+BOOSTS = {"reference/configuration": 2, "explanation/": 1.5, "developer/": 0.5, "research/": 0.05, "changelog/": 0.05}
 ITEM = re.compile(r" *([-*] |\d+\. )")
 
 
 def on_page_markdown(markdown, page, **_):
+    for start, boost in BOOSTS.items():
+        if page.file.src_uri.startswith(start):
+            page.meta["search"] = {"boost": boost}
     if is_help(page):
         markdown = "\n".join(line for long in markdown.split("\n") for line in wrapped_help(long))
     depth = page.file.src_uri.count("/")

@@ -15,6 +15,15 @@ sys.path.insert(0, str(ROOT / "tests/replay"))
 import browsers  # noqa: E402
 
 SITE = ROOT / "build/docs/site"
+# Queries of users, and the page that the search lists first.
+FIRST_PAGES = {
+    "--decision-steps": "reference/commands/evaluate",
+    "--camera-severity": "reference/commands/evaluate",
+    "minibatch_size": "reference/configuration",
+    "red light": "explanation/simulator",
+    "argmax": "reference/python/training",
+    "fault": "explanation/evaluation",
+}
 
 
 class Search(unittest.TestCase):
@@ -45,14 +54,31 @@ class Search(unittest.TestCase):
             self.skipTest("needs the site: scripts/docs builds it")
         self.browser.open(SITE / "how-to/train.html")
         for word, answer in (("jerk", r"^\s*\d+ matching documents"), ("zzzqqq", "No matching documents")):
-            self.browser.run(f"""(() => {{
-                const toggle = document.querySelector('[data-md-toggle=search]'), query = document.querySelector('[data-md-component=search-query]');
-                if (!toggle.checked) toggle.click();
-                query.value = {json.dumps(word)};
-                query.dispatchEvent(new Event('keyup', {{bubbles: true}}));
-            }})()""")
+            self.search(word)
             self.browser.wait_for(f"/{answer}/.test(document.querySelector('.md-search-result__meta').textContent)", timeout_s=20)
         self.assertEqual(self.browser.errors, [])
+
+    def test_the_built_site_finds_the_page_that_answers(self):
+        if not (SITE / "iframe-worker.js").exists():
+            self.skipTest("needs the site: scripts/docs builds it")
+        self.browser.open(SITE / "how-to/train.html")
+        first = "document.querySelector('.md-search-result__item > .md-search-result__link')?.href ?? ''"
+        for query, page in FIRST_PAGES.items():
+            with self.subTest(query=query):
+                self.search("zzzqqq")
+                self.browser.wait_for(f"({first}) === ''", timeout_s=20)
+                self.search(query)
+                self.browser.wait_for(f"({first}) !== ''", timeout_s=20)
+                self.assertIn(f"/{page}.html", self.browser.run(first))
+        self.assertEqual(self.browser.errors, [])
+
+    def search(self, query):
+        self.browser.run(f"""(() => {{
+            const toggle = document.querySelector('[data-md-toggle=search]'), field = document.querySelector('[data-md-component=search-query]');
+            if (!toggle.checked) toggle.click();
+            field.value = {json.dumps(query)};
+            field.dispatchEvent(new Event('keyup', {{bubbles: true}}));
+        }})()""")
 
 
 if __name__ == "__main__":
