@@ -1,9 +1,11 @@
 """Draws pictures for documents: network.png (layers of the network), summation_order.png (sums of the same numbers in
-different orders), training_update.png (parts of an update), realism_likelihood.png (likelihood of a recorded value).
+different orders), training_update.png (parts of an update), realism_likelihood.png (likelihood of a recorded value),
+evaluation.png (metrics of the released policies by density).
 
     python3 scripts/drawings.py FOLDER    writes into FOLDER; scripts/figures passes docs/images
 """
 
+import json
 import pathlib
 import sys
 
@@ -14,6 +16,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+ROOT = pathlib.Path(__file__).resolve().parents[1]
 BLUE, ORANGE, GREY = "#4361ee", "#fb8500", "#8d99ae"
 UPDATE = [
     ("Rollout", "one policy drives all agents\nof all worlds, each from\nits own observations"),
@@ -23,6 +26,15 @@ UPDATE = [
 ]
 COLORS = ["#4477aa", "#66ccee", "#228833", "#ccbb44"]
 WIDTH, GAP, HEIGHT = 2.3, 0.5, 1.35
+POLICIES = {"perspective": BLUE, "vector": ORANGE, "vector_auxiliary": "#2a9d8f"}
+DENSITIES = {"light": 60, "medium": 120, "dense": 150}  # agents per world
+METRICS = {
+    "km_per_infraction": "km per infraction",
+    "goals_per_vehicle": "goals per vehicle",
+    "at_fault_collision_rate": "share of vehicles:\nat-fault collision",
+    "off_road_rate": "share of vehicles:\noff-road",
+    "red_light_rate": "share of vehicles:\nred light",
+}
 
 
 def save(figure, path):
@@ -125,6 +137,25 @@ def draw_update(path):
     save(figure, path)
 
 
+def draw_evaluation(path):
+    """Draws metrics of the released policies by density, with 95 % intervals, from bench/results/agent_29_november.json."""
+    results = json.loads((ROOT / "bench/results/agent_29_november.json").read_text())["policies"]
+    figure, axes = plt.subplots(1, len(METRICS), figsize=(11, 2.9))
+    for policy, color in POLICIES.items():
+        (of_policy,) = (rows for name, rows in results.items() if name.startswith(f"models/{policy}.safetensors"))
+        rows = [of_policy[density]["rows"][0] for density in DENSITIES]
+        for panel, metric in zip(axes, METRICS, strict=True):
+            values, half_widths = ([row[key] for row in rows] for key in (metric, f"{metric}_half_width_95"))
+            panel.errorbar(list(DENSITIES.values()), values, half_widths, label=policy, color=color, marker="o", markersize=3, capsize=3)
+    for panel, title in zip(axes, METRICS.values(), strict=True):
+        panel.set_title(title, fontsize=10)
+        panel.set(xlabel="agents per world", xticks=list(DENSITIES.values()), ylim=(0, None))
+        panel.grid(alpha=0.3)
+    figure.tight_layout(rect=(0, 0, 1, 0.9))
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="upper center", ncols=len(POLICIES), frameon=False)
+    save(figure, path)
+
+
 def main():
     if len(sys.argv) != 2:
         sys.exit(f"error: drawings.py: expected a folder, got '{' '.join(sys.argv[1:])}'")
@@ -133,6 +164,7 @@ def main():
     draw_sums(folder / "summation_order.png")
     draw_update(folder / "training_update.png")
     draw_likelihood(folder / "realism_likelihood.png")
+    draw_evaluation(folder / "evaluation.png")
 
 
 if __name__ == "__main__":
