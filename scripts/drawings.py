@@ -1,8 +1,9 @@
 """Draws pictures for documents: network.png (layers of the network), summation_order.png (sums of the same numbers in
 different orders), training_update.png (parts of an update), realism_likelihood.png (likelihood of a recorded value),
-evaluation.png (metrics of the released policies by density).
+evaluation.png (metrics of the released policies by density), camera_severity.png (one agent's randomized cameras).
 
-    python3 scripts/drawings.py FOLDER    writes into FOLDER; scripts/figures passes docs/images
+    python3 scripts/drawings.py FOLDER    writes into FOLDER; scripts/figures passes docs/images. The package pictura
+                                          must be importable.
 """
 
 import json
@@ -15,6 +16,9 @@ import matplotlib.patches
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from PIL import Image
+
+import pictura
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 BLUE, ORANGE, GREY = "#4361ee", "#fb8500", "#8d99ae"
@@ -156,6 +160,23 @@ def draw_evaluation(path):
     save(figure, path)
 
 
+def draw_camera_severity(path):
+    """Draws one agent's images at four severities of randomized cameras, one row per severity. Columns: the cameras front
+    left, front, front right, back."""
+    agent, columns, gap_px = 6, [1, 0, 2, 3], 3  # an agent behind a car, two of whose cameras die
+    simulator = pictura.Simulator([pictura.Map.load("procedural:1")], [(0, 40)])
+    views = simulator.views.numpy().view(pictura.VIEW_DTYPE)[agent : agent + 1, 0].copy()
+    rows = []
+    for severity in (0, 0.25, 0.5, 1):
+        renderer = pictura.Renderer("cpu", pictura.Rig.paper(128, 72), camera_severity=severity)
+        for handle, geometry in simulator.geometries.items():
+            renderer.upload(handle, geometry)
+        images = renderer.render(simulator.scene, views).rgb.numpy()[0].transpose(0, 2, 3, 1)
+        gaps = ((0, gap_px), (0, gap_px), (0, 0))
+        rows.append(np.concatenate([np.pad(images[i], gaps, constant_values=255) for i in columns], axis=1))
+    Image.fromarray(np.concatenate(rows)[:-gap_px, :-gap_px]).save(path)
+
+
 def main():
     if len(sys.argv) != 2:
         sys.exit(f"error: drawings.py: expected a folder, got '{' '.join(sys.argv[1:])}'")
@@ -165,6 +186,7 @@ def main():
     draw_update(folder / "training_update.png")
     draw_likelihood(folder / "realism_likelihood.png")
     draw_evaluation(folder / "evaluation.png")
+    draw_camera_severity(folder / "camera_severity.png")
 
 
 if __name__ == "__main__":
