@@ -9,9 +9,9 @@ three ways:
 import re
 import textwrap
 
-# Factors of scores in the search: explanations, and the page that lists all keys, come before pages that mention a word.
+# Factors of scores in the search: the page that lists all keys, and explanations, come before pages that mention a word.
 # Pages for developers and histories come last.
-BOOSTS = {"reference/configuration": 2, "explanation/": 1.5, "developer/": 0.5, "research/": 0.05, "changelog/": 0.05}
+BOOSTS = {"reference/configuration": 2, "explanation/": 1.3, "developer/": 0.5, "research/": 0.05, "changelog/": 0.05}
 ITEM = re.compile(r" *([-*] |\d+\. )")
 
 

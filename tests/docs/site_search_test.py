@@ -23,6 +23,7 @@ FIRST_PAGES = {
     "red light": "explanation/simulator",
     "argmax": "reference/python/training",
     "fault": "explanation/evaluation",
+    "out of memory": "how-to/troubleshoot",
 }
 
 
