@@ -397,7 +397,7 @@ def load_policy(path: str | os.PathLike[str], average: bool = False) -> Policy:
         >>> from pictura.torch import load_policy
         >>> policy = load_policy("models/vector.safetensors")
         >>> policy.modality, policy.metadata["config"]["policy"]["backbone_width"]
-        ('vector', 512)
+        ('vector', 1024)
     """
     path = os.fspath(path)
     with _named(path):
