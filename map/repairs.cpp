@@ -94,7 +94,7 @@ Text text_of(RepairKind kind) {
     case RepairKind::short_way: return {"lines of fewer than two points", "left out"};
     case RepairKind::borderless_lanelet: return {"lanelets without one left and one right border", "left out"};
     case RepairKind::empty_lanelet: return {"lanelets of no length", "left out"};
-    case RepairKind::unknown_subtype: return {"unknown subtypes of lanelets", "counted as other lanes"};
+    case RepairKind::unknown_subtype: return {"unknown subtypes of lanelets", "read as lanes of type other"};
     case RepairKind::open_area: return {"areas whose outline is not closed or crosses itself", "left out"};
     case RepairKind::empty_rule: return {"incomplete regulatory elements", "left out"};
   }

@@ -93,7 +93,8 @@ class Ranks(CommandCase):
 
     def test_two_ranks_with_opponents_train_as_one_does(self):
         opponent = CONFIGS.parent / "models/vector.safetensors"
-        self.assert_two_train_as_one("--set", f'simulator.others.policies=["{opponent}=0.3"]')
+        steps = ["--set", "train.num_steps=9"]  # a multiple of the opponent's decision steps
+        self.assert_two_train_as_one(*steps, "--set", f'simulator.others.policies=["{opponent}=0.3"]')
 
     def assert_two_train_as_one(self, *settings):
         one = ["--set", "train.updates=1", *self.GRADIENTS, "--set", "train.adv_filter_threshold=0.2", *settings]
