@@ -10,7 +10,7 @@ namespace pictura {
 
 namespace {
 
-// Returns the teacher's configuration with exactly mounted cameras and the threads and kernels of the run.
+// Returns the teacher's configuration with exactly mounted cameras and the run's section `run`.
 Config config_of(const SavedPolicy& saved, const Config& run) {
   Config config = with_session_options(saved.config, {});
   config.run = run.run;

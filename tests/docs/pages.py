@@ -60,8 +60,8 @@ def links(text):
 
 
 def blocks(text):
-    """[(kind, line, text)] of a page in order: "paragraph", "item" of a list, "cell" of a table, "heading". No code or
-    `:::` blocks; the line is that on which the block begins."""
+    """Returns [(kind, line, text)] of a page's blocks in order, without code and `:::` blocks. Kinds: "paragraph", "item" of a
+    list, "cell" of a table, "heading". line: the block's first line."""
     found, is_open = [], False
     for number, line in enumerate(without_blocks(text).split("\n"), 1):
         stripped = line.strip()
