@@ -106,10 +106,11 @@ PICTURA_HD void choose_tries(const Team& team, const WorldView& world, const Wor
   add_to_standing(max_of(turn_begin, 0), count);
 }
 
-/// spawned_out: number of agents that found a place.
+/// spawned_out: number of agents that found a place. This function and the phases that call it are always inlined.
+/// Otherwise kernels would keep `world` in local memory, which for a block of this size exceeds the L1 cache.
 template <typename Team>
-PICTURA_HD void begin_episode(const Team& team, const WorldView& world, const WorldScratch& scratch,
-                              int32_t* spawned_out) {
+[[gnu::always_inline]] PICTURA_HD inline void begin_episode(const Team& team, const WorldView& world,
+                                                            const WorldScratch& scratch, int32_t* spawned_out) {
   const int num_parked = world.num_boxes - world.num_agents;
   team.for_each(static_cast<int>(world.map.stop_lines.size()), [&](int light) { begin_light(world, light); });
   team.for_each(world.num_agents, [&](int agent) { draw_agent(world, agent); });
@@ -147,7 +148,7 @@ struct BeginFirstEpisode {
   const uint8_t* mask;
   uint64_t seed;
   template <typename Team>
-  PICTURA_HD void operator()(const Team& team, int w) const {
+  [[gnu::always_inline]] PICTURA_HD void operator()(const Team& team, int w) const {
     if (mask && !mask[w]) return;
     team.for_each(1, [&](int) {
       arrays.seed[w] = arrays.worlds[w].seed = arrays.next_worlds[w].seed = seed;
@@ -228,7 +229,7 @@ void launch_sort_boxes(const Launch& launch, const PhaseArrays& arrays, bool end
 struct PrepareEpisode {
   PhaseArrays arrays;
   template <typename Team>
-  PICTURA_HD void operator()(const Team& team, int w) const {
+  [[gnu::always_inline]] PICTURA_HD void operator()(const Team& team, int w) const {
     if (!arrays.prepares[w]) return;
     begin_episode(team, arrays.next_world(w), arrays.scratch[w], &arrays.next_spawned[w]);
   }
