@@ -161,13 +161,33 @@ __global__ void __launch_bounds__(kObserveThreads, kObserveBlocks) run_staged_gr
   if (item < count) phase(group, static_cast<int32_t>(item));
 }
 
+/// Returns world number `turn` of the worlds with work, or -1. All threads of a warp must call it.
+template <typename Phase>
+__device__ int32_t world_with_work(const Phase& phase, int32_t count, int turn) {
+  for (int32_t first = 0; first < count; first += kWarp) {
+    const int32_t own = first + static_cast<int32_t>(threadIdx.x) % kWarp;
+    uint32_t worlds = __ballot_sync(~0u, own < count && phase.has_work(own));
+    const int found = __popc(worlds);
+    if (turn >= found) {
+      turn -= found;
+      continue;
+    }
+    for (; turn > 0; --turn) worlds &= worlds - 1;
+    return first + __ffs(static_cast<int>(worlds)) - 1;
+  }
+  return -1;
+}
+
+/// Blocks take the worlds with work in turn, so that no block has two while another has none.
 template <typename Phase>
 __global__ void __launch_bounds__(kTeamThreads) run_teams(int32_t count, Phase phase) {
   __shared__ TeamMemory memory;
   DeviceTeam team;
   team.shared = &memory;
-  for (int32_t item = static_cast<int32_t>(blockIdx.x); item < count; item += static_cast<int32_t>(gridDim.x)) {
-    phase(team, item);
+  for (int turn = static_cast<int>(blockIdx.x);; turn += static_cast<int>(gridDim.x)) {
+    const int32_t w = world_with_work(phase, count, turn);
+    if (w < 0) return;
+    phase(team, w);
   }
 }
 

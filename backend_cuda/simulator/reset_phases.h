@@ -147,9 +147,9 @@ struct BeginFirstEpisode {
   PhaseArrays arrays;
   const uint8_t* mask;
   uint64_t seed;
+  PICTURA_HD bool has_work(int w) const { return !mask || mask[w]; }
   template <typename Team>
   [[gnu::always_inline]] PICTURA_HD void operator()(const Team& team, int w) const {
-    if (mask && !mask[w]) return;
     team.for_each(1, [&](int) {
       arrays.seed[w] = arrays.worlds[w].seed = arrays.next_worlds[w].seed = seed;
       arrays.episode_over[w] = 0;
@@ -180,11 +180,13 @@ struct PlaceCenters {
 struct SortBoxes {
   PhaseArrays arrays;
   bool ends_step = false;
+  PICTURA_HD bool has_work(int w) const {
+    return arrays.scratch[w].cell_begin && (!ends_step || arrays.began[w] || arrays.has_lives);
+  }
   template <typename Team>
   PICTURA_HD void operator()(const Team& team, int w) const {
     int32_t* const begin = arrays.scratch[w].cell_begin;
     int32_t* const items = arrays.scratch[w].cell_items;
-    if (!begin || (ends_step && !arrays.began[w] && !arrays.has_lives)) return;
     const WorldView world = arrays.world(w);
     const GridView& cells = world.box_cells;
     const int num_cells = cells.num_x * cells.num_y;
@@ -228,9 +230,9 @@ void launch_sort_boxes(const Launch& launch, const PhaseArrays& arrays, bool end
 /// steps.
 struct PrepareEpisode {
   PhaseArrays arrays;
+  PICTURA_HD bool has_work(int w) const { return arrays.prepares[w]; }
   template <typename Team>
   [[gnu::always_inline]] PICTURA_HD void operator()(const Team& team, int w) const {
-    if (!arrays.prepares[w]) return;
     begin_episode(team, arrays.next_world(w), arrays.scratch[w], &arrays.next_spawned[w]);
   }
 };

@@ -72,6 +72,7 @@ struct ShuffledLaunch {
   template <typename Phase>
   void teams(int32_t count, const Phase& phase) const {
     shuffled(random, count, [this, &phase](int i) {
+      if (!phase.has_work(i)) return;
       cuda::TeamMemory memory;
       ShuffledTeam team;
       team.random = random;
