@@ -252,6 +252,7 @@ WorldView SimulatorSetup::view(int world, const MapView& map, const RuleOptions&
   view.index = world;
   view.seed = config.seed;
   view.global_world = worlds[w].global_world;
+  view.has_other_drivers = has_other_drivers();
   view.first_slot = slot_begin[w];
   view.num_agents = worlds[w].num_agents;
   view.first_box = box_begin[w];

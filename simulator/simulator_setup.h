@@ -30,6 +30,7 @@ struct SimulatorSetup : SimulatorParts {
   /// Whether agents have lives: true if a map is open.
   bool has_lives() const;
   bool has_replayed_tracks() const;
+  bool has_other_drivers() const { return options.others.sum() > 0; }
   SimulatorCapacity needs() const { return capacity_of(maps, worlds); }
   /// Reserves memory, so that assigning another setup within the capacity moves no array.
   void reserve(const SimulatorCapacity& capacity);

@@ -88,12 +88,12 @@ struct WriteObservation {
   PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
     const WorldView world = arrays.world(arrays.world_of_slot[slot]);
     const int agent = slot - world.first_slot;
+    observe_own(world, agent, slot, arrays.observations, group);
     const Hides hidden = hidden_from(world, agent);
     if (group.rank() == group.size() - 1) {
       arrays.views[slot] = view_of(world, agent, hidden);
       arrays.driver[slot] = static_cast<uint8_t>(driver_of(driver_kind_of(world, agent)));
     }
-    observe_own(world, agent, slot, arrays.observations, group);
     if (!arrays.entity_sets) return;
     ObservationWriter::write_sets(group, world, agent, StepObservation{}, arrays.observations, slot, hidden);
   }

@@ -49,6 +49,7 @@ struct PhaseArrays {
   uint8_t entity_sets = 0;
   uint8_t has_lives = 0;  // whether some map has roads that end
   uint8_t has_replayed_tracks = 0;
+  uint8_t has_other_drivers = 0;
   int32_t parked_per_world = 0;  // boxes of a world that belong to no agent
   uint8_t has_crowds = 0;
   // Values for later phases and steps:
@@ -65,6 +66,7 @@ struct PhaseArrays {
   PICTURA_HD WorldView world(int w) const {
     WorldView world = worlds[w];
     world.agents = agents;
+    world.has_other_drivers = has_other_drivers;
     world.step = episode_step[w];
     return world;
   }

@@ -345,6 +345,7 @@ class SimulatorCuda final : public Simulator {
     arrays.entity_sets = config().vector_observations;
     arrays.has_lives = setup_.has_lives();
     arrays.has_replayed_tracks = setup_.has_replayed_tracks();
+    arrays.has_other_drivers = setup_.has_other_drivers();
     arrays.parked_per_world = config().parked_cars;
     arrays.has_crowds = has_crowds_;
     arrays.began = scratch_.began.data();

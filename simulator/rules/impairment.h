@@ -12,7 +12,6 @@ namespace pictura {
 /// Draws an agent's driver kind for an episode: 0 for a learning agent, else 1 + the index of a share in OtherShares.
 PICTURA_HD inline int draw_driver_kind(const OtherShares& shares, uint64_t seed, uint32_t world, uint32_t agent,
                                        uint32_t episode) {
-  if (shares.sum() <= 0.0f) return 0;
   RandomStream random(
       {.seed = seed, .world = world, .agent = agent, .episode = episode, .purpose = Purpose::impairment});
   const float drawn = random.uniform();

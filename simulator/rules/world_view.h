@@ -36,8 +36,9 @@ struct WorldView {
   uint64_t seed = 0;
   uint32_t global_world = 0;
   uint32_t episode = 0;
-  int step = 0;             // steps taken in the episode
-  AgentStateView agents{};  // [slots of all worlds]
+  int step = 0;                    // steps taken in the episode
+  bool has_other_drivers = false;  // whether options.others has a share above 0
+  AgentStateView agents{};         // [slots of all worlds]
   int first_slot = 0;
   int num_agents = 0;  // controlled agents
   int first_box = 0;   // in the scene
@@ -130,6 +131,7 @@ PICTURA_HD inline AgentBox box_of(const AgentStateView& agents, int slot) {
 
 /// See draw_driver_kind().
 PICTURA_HD inline int driver_kind_of(const WorldView& world, int agent) {
+  if (!world.has_other_drivers) return 0;
   return draw_driver_kind(world.options.others, world.seed, world.global_world, static_cast<uint32_t>(agent),
                           world.episode);
 }

@@ -206,6 +206,7 @@ class ShuffledExecutor {
     arrays.entity_sets = host.setup.config.vector_observations;
     arrays.has_lives = host.setup.has_lives();
     arrays.has_replayed_tracks = host.setup.has_replayed_tracks();
+    arrays.has_other_drivers = host.setup.has_other_drivers();
     arrays.parked_per_world = host.setup.config.parked_cars;
     arrays.has_crowds = has_crowds_;
     arrays.began = began_.data();
