@@ -14,6 +14,7 @@ struct Philox4 {
 
 /// Philox4x32 with ten rounds: the block of a counter under a 64-bit key.
 PICTURA_HD inline Philox4 philox4x32_10(Philox4 counter, uint32_t key0, uint32_t key1) {
+  PICTURA_NO_UNROLL
   for (int round = 0; round < 10; ++round) {
     const uint64_t product0 = uint64_t{0xD2511F53u} * counter.word[0];
     const uint64_t product1 = uint64_t{0xCD9E8D57u} * counter.word[2];
