@@ -79,7 +79,7 @@ class ObservationWriter {
   }
 };
 
-/// Writes a slot's view and observation.
+/// Writes a slot's view and observation. This last phase of a launch also prepares the check of the next commands.
 struct WriteObservation {
   PhaseArrays arrays;
   static constexpr int kStaging = ObservationWriter::kStaging;
@@ -88,6 +88,7 @@ struct WriteObservation {
   PICTURA_HD void operator()(const ThreadGroup& group, int slot) const {
     const WorldView world = arrays.world(arrays.world_of_slot[slot]);
     const int agent = slot - world.first_slot;
+    if (slot == 0 && group.rank() == 0) *arrays.rejected_slot = kNoSlot;
     observe_own(world, agent, slot, arrays.observations, group);
     const Hides hidden = hidden_from(world, agent);
     if (group.rank() == group.size() - 1) {

@@ -194,7 +194,6 @@ void launch_step(const Launch& launch, const PhaseArrays& arrays, const CommandT
   launch.copy(arrays.prepares, arrays.began, static_cast<size_t>(arrays.num_worlds));
   launch.fork_join([&](const Launch& side) { side.teams(arrays.num_worlds, PrepareEpisode{arrays}); },
                    [&] {
-                     launch.fill(arrays.rejected_slot, sizeof(int32_t), kNoSlot & 0xFF);
                      launch.threads(arrays.num_slots, CheckCommands<CommandType>{arrays, commands});
                      launch.template groups<kThreadsPerAgent>(arrays.num_slots, Advance<CommandType>{arrays, commands});
                      if (arrays.has_replayed_tracks) {
