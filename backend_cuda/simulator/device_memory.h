@@ -303,7 +303,7 @@ class SideStream {
     }
   }
   cuda::StepStreams streams_from(cudaStream_t stream) const {
-    return {stream, side_.get(), forked_.get(), joined_.get()};
+    return {stream, side_.get(), forked_.get(), joined_.get(), may_begin_early_};
   }
 
  private:
@@ -314,6 +314,7 @@ class SideStream {
   using Event = std::unique_ptr<std::remove_pointer_t<cudaEvent_t>, Destroy>;
   std::unique_ptr<std::remove_pointer_t<cudaStream_t>, Destroy> side_;
   Event forked_, joined_;
+  const bool may_begin_early_ = cuda::may_begin_early();
 };
 
 }  // namespace pictura

@@ -3,6 +3,7 @@
 #include <type_traits>
 
 #include "pictura/backend_cuda/simulator/kernels.h"
+#include "pictura/common/portable/async_copy.h"
 
 namespace pictura::cuda {
 namespace {
@@ -144,6 +145,7 @@ constexpr int kGroupBlocks = 5, kObserveBlocks = 16;
 
 template <int kGroup, typename Phase>
 __global__ void __launch_bounds__(kThreads, kGroupBlocks) run_groups(int32_t count, Phase phase) {
+  wait_for_earlier_launch();
   const int64_t item = (int64_t{blockIdx.x} * kThreads + threadIdx.x) / kGroup;
   if (item < count) phase(DeviceThreadGroup<kGroup>{}, static_cast<int32_t>(item));
 }
@@ -155,6 +157,7 @@ template <typename Phase>
 __global__ void __launch_bounds__(kObserveThreads, kObserveBlocks) run_staged_groups(int32_t count, Phase phase) {
   __shared__ float4 staging[kObserveThreads / kWarp][Phase::kStaging / 4];
   static_assert(Phase::kStaging % 4 == 0);
+  wait_for_earlier_launch();
   const int64_t item = (int64_t{blockIdx.x} * kObserveThreads + threadIdx.x) / kWarp;
   DeviceThreadGroup<kWarp> group;
   group.rows = reinterpret_cast<float*>(staging[threadIdx.x / kWarp]);
@@ -202,6 +205,20 @@ struct DeviceLaunch {
   void copy(void* to, const void* from, size_t size) const {
     cudaMemcpyAsync(to, from, size, cudaMemcpyDeviceToDevice, streams.main);
   }
+  /// Launches a kernel that calls wait_for_earlier_launch(), so that it may begin while the previous kernel ends.
+  template <typename Phase>
+  void start(void (*kernel)(int32_t, Phase), int64_t threads, int block, int32_t count, const Phase& phase) const {
+    cudaLaunchAttribute attribute{};
+    attribute.id = cudaLaunchAttributeProgrammaticStreamSerialization;
+    attribute.val.programmaticStreamSerializationAllowed = 1;
+    cudaLaunchConfig_t config{};
+    config.gridDim = dim3(blocks_for(threads, block));
+    config.blockDim = dim3(static_cast<unsigned>(block));
+    config.stream = streams.main;
+    config.attrs = &attribute;
+    config.numAttrs = streams.may_begin_early ? 1 : 0;
+    cudaLaunchKernelEx(&config, kernel, count, phase);
+  }
   template <typename Phase>
   void threads(int32_t count, const Phase& phase) const {
     run_threads<<<blocks_for(count), kThreads, 0, streams.main>>>(count, phase);
@@ -210,10 +227,9 @@ struct DeviceLaunch {
   void groups(int32_t count, const Phase& phase) const {
     if constexpr (requires { Phase::kStaging; }) {
       static_assert(kGroup == kWarp);
-      run_staged_groups<<<blocks_for(int64_t{count} * kGroup, kObserveThreads), kObserveThreads, 0, streams.main>>>(
-          count, phase);
+      start(run_staged_groups<Phase>, int64_t{count} * kGroup, kObserveThreads, count, phase);
     } else {
-      run_groups<kGroup><<<blocks_for(int64_t{count} * kGroup), kThreads, 0, streams.main>>>(count, phase);
+      start(run_groups<kGroup, Phase>, int64_t{count} * kGroup, kThreads, count, phase);
     }
   }
   template <typename Phase>
@@ -239,6 +255,12 @@ struct DeviceLaunch {
 };
 
 }  // namespace
+
+bool may_begin_early() {
+  cudaFuncAttributes attributes{};
+  return cudaFuncGetAttributes(&attributes, run_groups<kWarp, PlaceCenters>) == cudaSuccess &&
+         attributes.ptxVersion >= 90;
+}
 
 void launch_reset(const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed, const StepStreams& streams) {
   launch_reset(DeviceLaunch{streams}, arrays, mask, seed);

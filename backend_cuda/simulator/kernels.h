@@ -12,7 +12,12 @@ namespace pictura::cuda {
 struct StepStreams {
   cudaStream_t main = nullptr, side = nullptr;
   cudaEvent_t forked = nullptr, joined = nullptr;
+  bool may_begin_early = false;  // see may_begin_early()
 };
+
+/// Whether kernels of thread groups for the current device call wait_for_earlier_launch(): from compute capability 9.0
+/// on.
+bool may_begin_early();
 
 /// mask: [worlds]; null: all worlds.
 void launch_reset(const PhaseArrays& arrays, const uint8_t* mask, uint64_t seed, const StepStreams& streams);
