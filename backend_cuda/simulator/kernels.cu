@@ -8,7 +8,7 @@
 namespace pictura::cuda {
 namespace {
 
-constexpr int kThreads = 128;  // per block
+constexpr int kThreads = 128;  // per block of run_threads
 constexpr int kTeamThreads =
     kTurn * kThreadsPerAgent;  // as wide as the loops, because a world's start is one long chain of work
 
@@ -140,25 +140,26 @@ __global__ void __launch_bounds__(kThreads) run_threads(int32_t count, Phase pha
   if (item < count) phase(DeviceAtomics{}, static_cast<int32_t>(item));
 }
 
+// Threads of blocks of groups. Blocks are small, because a block occupies its place on the multiprocessor until its
+// last warp ends.
+constexpr int kGroupThreads = 64;
 // Blocks per multiprocessor. They leave fewer registers than the compiler would choose, but hide more latency.
-constexpr int kGroupBlocks = 5, kObserveBlocks = 16;
+constexpr int kGroupBlocks = 10, kObserveBlocks = 16;
 
 template <int kGroup, typename Phase>
-__global__ void __launch_bounds__(kThreads, kGroupBlocks) run_groups(int32_t count, Phase phase) {
+__global__ void __launch_bounds__(kGroupThreads, kGroupBlocks) run_groups(int32_t count, Phase phase) {
   wait_for_earlier_launch();
-  const int64_t item = (int64_t{blockIdx.x} * kThreads + threadIdx.x) / kGroup;
+  const int64_t item = (int64_t{blockIdx.x} * kGroupThreads + threadIdx.x) / kGroup;
   if (item < count) phase(DeviceThreadGroup<kGroup>{}, static_cast<int32_t>(item));
 }
 
-/// Block size of groups with memory of their own. Blocks are small, because a block occupies its place on the
-/// multiprocessor until its last warp ends.
-constexpr int kObserveThreads = 64;
+/// Groups with memory of their own.
 template <typename Phase>
-__global__ void __launch_bounds__(kObserveThreads, kObserveBlocks) run_staged_groups(int32_t count, Phase phase) {
-  __shared__ float4 staging[kObserveThreads / kWarp][Phase::kStaging / 4];
+__global__ void __launch_bounds__(kGroupThreads, kObserveBlocks) run_staged_groups(int32_t count, Phase phase) {
+  __shared__ float4 staging[kGroupThreads / kWarp][Phase::kStaging / 4];
   static_assert(Phase::kStaging % 4 == 0);
   wait_for_earlier_launch();
-  const int64_t item = (int64_t{blockIdx.x} * kObserveThreads + threadIdx.x) / kWarp;
+  const int64_t item = (int64_t{blockIdx.x} * kGroupThreads + threadIdx.x) / kWarp;
   DeviceThreadGroup<kWarp> group;
   group.rows = reinterpret_cast<float*>(staging[threadIdx.x / kWarp]);
   if (item < count) phase(group, static_cast<int32_t>(item));
@@ -198,7 +199,7 @@ __global__ void __launch_bounds__(kTeamThreads) run_teams(int32_t count, Phase p
 struct DeviceLaunch {
   StepStreams streams;
 
-  static unsigned blocks_for(int64_t threads, int block = kThreads) {
+  static unsigned blocks_for(int64_t threads, int block) {
     return static_cast<unsigned>((threads + block - 1) / block);
   }
   void fill(void* memory, size_t size, int byte) const { cudaMemsetAsync(memory, byte, size, streams.main); }
@@ -207,13 +208,13 @@ struct DeviceLaunch {
   }
   /// Launches a kernel that calls wait_for_earlier_launch(), so that it may begin while the previous kernel ends.
   template <typename Phase>
-  void start(void (*kernel)(int32_t, Phase), int64_t threads, int block, int32_t count, const Phase& phase) const {
+  void start(void (*kernel)(int32_t, Phase), int group, int32_t count, const Phase& phase) const {
     cudaLaunchAttribute attribute{};
     attribute.id = cudaLaunchAttributeProgrammaticStreamSerialization;
     attribute.val.programmaticStreamSerializationAllowed = 1;
     cudaLaunchConfig_t config{};
-    config.gridDim = dim3(blocks_for(threads, block));
-    config.blockDim = dim3(static_cast<unsigned>(block));
+    config.gridDim = dim3(blocks_for(int64_t{count} * group, kGroupThreads));
+    config.blockDim = dim3(kGroupThreads);
     config.stream = streams.main;
     config.attrs = &attribute;
     config.numAttrs = streams.may_begin_early ? 1 : 0;
@@ -221,15 +222,15 @@ struct DeviceLaunch {
   }
   template <typename Phase>
   void threads(int32_t count, const Phase& phase) const {
-    run_threads<<<blocks_for(count), kThreads, 0, streams.main>>>(count, phase);
+    run_threads<<<blocks_for(count, kThreads), kThreads, 0, streams.main>>>(count, phase);
   }
   template <int kGroup, typename Phase>
   void groups(int32_t count, const Phase& phase) const {
     if constexpr (requires { Phase::kStaging; }) {
       static_assert(kGroup == kWarp);
-      start(run_staged_groups<Phase>, int64_t{count} * kGroup, kObserveThreads, count, phase);
+      start(run_staged_groups<Phase>, kGroup, count, phase);
     } else {
-      start(run_groups<kGroup, Phase>, int64_t{count} * kGroup, kThreads, count, phase);
+      start(run_groups<kGroup, Phase>, kGroup, count, phase);
     }
   }
   template <typename Phase>
