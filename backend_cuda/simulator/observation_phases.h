@@ -18,29 +18,64 @@ class ObservationWriter {
   template <typename ThreadGroup, typename Observation>
   PICTURA_HD static void write_sets(const ThreadGroup& group, const WorldView& world, int agent,
                                     const Observation& observation, const ObservationView& out, int row, Hides hidden) {
-    for (int k = 0; k < num_observed_sets(out); ++k) {
-      const auto set = static_cast<EntitySet>(k);
-      write_set(group, world, agent, set, set_rows(out, row, set), observation, hidden);
-    }
+    const int num_sets = num_observed_sets(out);
+    const NearLists<ThreadGroup> near(group, world.map, near_place(world, world.first_slot + agent), num_sets);
+    write_set<EntitySet::partners>(group, world, agent, observation, out, row, hidden, near);
+    write_set<EntitySet::lanes>(group, world, agent, observation, out, row, hidden, near);
+    write_set<EntitySet::boundaries>(group, world, agent, observation, out, row, hidden, near);
+    write_set<EntitySet::controls>(group, world, agent, observation, out, row, hidden, near);
+    if (num_sets < kNumEntitySets) return;
+    write_set<EntitySet::walls>(group, world, agent, observation, out, row, hidden, near);
   }
 
  private:
-  /// Assembles the rows in the group's own memory, so that they are written whole and in order.
-  template <typename ThreadGroup, typename Observation>
-  PICTURA_HD static void write_set(const ThreadGroup& group, const WorldView& world, int agent, EntitySet set,
-                                   const SetRows& out, const Observation& observation, Hides hidden) {
+  /// Bounds of an agent's lists of pieces and stop lines. The group's threads load the bounds of all sets at once, and
+  /// share them out: a warp's thread 2 k keeps the begin, and thread 2 k + 1 the end, of set k's list.
+  template <typename ThreadGroup>
+  class NearLists {
+   public:
+    PICTURA_HD NearLists(const ThreadGroup& group, const MapView& map, NearPlace place, int num_sets) {
+      for (int i = 0; i < kPerThread; ++i) {
+        const int bound = i * ThreadGroup::kSize + group.rank();
+        const auto set = static_cast<EntitySet>(bound / 2);
+        if (set == EntitySet::partners || bound >= 2 * num_sets) continue;
+        bounds_[i] = lists_near(map, set).begin[list_index(place, set) + static_cast<uint32_t>(bound % 2)];
+      }
+    }
+    /// Returns the same as items_near(). All threads of the group must call it.
+    PICTURA_HD Span<const int32_t> items(const ThreadGroup& group, const MapView& map, EntitySet set) const {
+      const int first = 2 * static_cast<int>(set);
+      const int32_t begin = bound(group, first);
+      return lists_near(map, set).items.subspan(begin, bound(group, first + 1) - begin);
+    }
+
+   private:
+    PICTURA_HD int32_t bound(const ThreadGroup& group, int index) const {
+      return group.from(index % ThreadGroup::kSize, bounds_[kPerThread == 1 ? 0 : index / ThreadGroup::kSize]);
+    }
+    static constexpr int kPerThread = (2 * kNumEntitySets + ThreadGroup::kSize - 1) / ThreadGroup::kSize;
+    int32_t bounds_[kPerThread] = {};
+  };
+
+  /// Assembles the rows in the group's own memory, so that they are written whole and in order. The set is a template
+  /// argument, because a loop over sets would keep more values than a thread has registers.
+  template <EntitySet set, typename ThreadGroup, typename Observation>
+  PICTURA_HD static void write_set(const ThreadGroup& group, const WorldView& world, int agent,
+                                   const Observation& observation, const ObservationView& all_out, int row,
+                                   Hides hidden, const NearLists<ThreadGroup>& near) {
+    const SetRows out = set_rows(all_out, row, set);
     const int slot = world.first_slot + agent;
     float* rows = group.staging();
     int count = 0;
     if (observes_set(world, agent, set, hidden)) {
       const EgoFrame frame = ego_frame(world.agents, slot);
-      const NearPlace place = near_place(world, slot);  // recomputed, to save registers
-      if (set == EntitySet::partners) {
+      if constexpr (set == EntitySet::partners) {
         count = observation.observe_partners(world, agent, frame, rows, group);
-      } else if (set == EntitySet::controls) {
-        count = observe_controls(world, slot, place, frame, rows, group);
+      } else if constexpr (set == EntitySet::controls) {
+        count = observe_controls(world, slot, near.items(group, world.map, set), frame, rows, group);
       } else {
-        count = collect_pieces(group, pieces_near(world.map, place, set), frame, out.capacity, rows);
+        const PieceList pieces = piece_list(world.map, set, near.items(group, world.map, set));
+        count = collect_pieces(group, pieces, frame, out.capacity, rows);
       }
     }
     const int end = max_of(count, observation.num_filled(out));

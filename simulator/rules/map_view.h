@@ -216,17 +216,18 @@ PICTURA_HD inline Span<const int32_t> items_at(const GridView& cells, Vec2 p) {
 /// Sectors of 45 degrees. Each cell has a list per sector, because visible pieces depend on the heading.
 constexpr int kSectors = 8;
 
-/// Cell and heading sector of an observer.
+/// Cell and heading sector of an observer, in one number to save registers.
 struct NearPlace {
-  size_t cell = 0, sector = 0;
-  PICTURA_HD size_t cell_and_sector() const { return cell * kSectors + sector; }
+  uint32_t cell_and_sector = 0;
+  PICTURA_HD uint32_t cell() const { return cell_and_sector / kSectors; }
 };
 
 /// heading_rad must be in [-pi, pi].
 PICTURA_HD inline NearPlace near_place(const MapView& map, Vec2 p, float heading_rad) {
   const GridView& cells = map.near_lane_pieces;
   const int sector = clamp(static_cast<int>((heading_rad + kPi) * (kSectors / kTwoPi)), 0, kSectors - 1);
-  return {static_cast<size_t>(cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x)), static_cast<size_t>(sector)};
+  const auto cell = static_cast<uint32_t>(cells.cell_y(p.y) * cells.num_x + cells.cell_x(p.x));
+  return {cell * kSectors + static_cast<uint32_t>(sector)};
 }
 
 }  // namespace pictura

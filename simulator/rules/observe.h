@@ -167,11 +167,10 @@ PICTURA_HD constexpr float light_code(LightState state) {
   return 0.5f * static_cast<float>(halves);
 }
 
-/// Writes the nearest stop lines.
+/// Writes the nearest stop lines. `items` must come from items_near().
 template <typename ThreadGroup = SingleThread>
-PICTURA_HD int observe_controls(const WorldView& world, int slot, const NearPlace& place, const EgoFrame& frame,
+PICTURA_HD int observe_controls(const WorldView& world, int slot, Span<const int32_t> items, const EgoFrame& frame,
                                 float* rows, const ThreadGroup& group = {}) {
-  const Span<const int32_t> items = list_of(world.map.near_stop_lines, place.cell);
   const int num_items = static_cast<int>(items.size());
   typename ThreadGroup::template Nearest<kMaxControls> nearest;
   for (int first = 0; first < num_items; first += group.size()) {
@@ -267,22 +266,39 @@ PICTURA_HD inline NearPlace near_place(const WorldView& world, int slot) {
   return near_place(world.map, {agents.x_m[slot], agents.y_m[slot]}, agents.heading_rad[slot]);
 }
 
-PICTURA_HD inline PieceList pieces_near(const MapView& map, const NearPlace& place, EntitySet set) {
+/// Lists of the pieces or stop lines of a set, for all places.
+PICTURA_HD inline const GridView& lists_near(const MapView& map, EntitySet set) {
   switch (set) {
-    case EntitySet::lanes:
-      return {map.lane_pieces, map.lane_middles, list_of(map.near_lane_pieces, place.cell_and_sector())};
-    case EntitySet::walls:
-      return {map.wall_pieces, map.wall_middles, list_of(map.near_wall_pieces, place.cell_and_sector())};
-    default:
-      return {map.boundary_pieces, map.boundary_middles, list_of(map.near_boundary_pieces, place.cell_and_sector())};
+    case EntitySet::lanes: return map.near_lane_pieces;
+    case EntitySet::walls: return map.near_wall_pieces;
+    case EntitySet::controls: return map.near_stop_lines;
+    default: return map.near_boundary_pieces;
   }
 }
 
-/// Prefetches the list of pieces_near(), because all lists together exceed a core's caches.
-PICTURA_HD inline void prefetch_list_near(const MapView& map, const NearPlace& place, EntitySet set) {
+/// Index of a place's list in lists_near().
+PICTURA_HD inline uint32_t list_index(NearPlace place, EntitySet set) {
+  return set == EntitySet::controls ? place.cell() : place.cell_and_sector;
+}
+
+PICTURA_HD inline Span<const int32_t> items_near(const MapView& map, NearPlace place, EntitySet set) {
+  return list_of(lists_near(map, set), list_index(place, set));
+}
+
+/// `items` must come from items_near().
+PICTURA_HD inline PieceList piece_list(const MapView& map, EntitySet set, Span<const int32_t> items) {
+  switch (set) {
+    case EntitySet::lanes: return {map.lane_pieces, map.lane_middles, items};
+    case EntitySet::walls: return {map.wall_pieces, map.wall_middles, items};
+    default: return {map.boundary_pieces, map.boundary_middles, items};
+  }
+}
+
+/// Prefetches the list of items_near(), because all lists together exceed a core's caches.
+PICTURA_HD inline void prefetch_list_near(const MapView& map, NearPlace place, EntitySet set) {
   constexpr int kLines = 5, kLineBytes = 64;  // enough for most lists
   if (set == EntitySet::partners || set == EntitySet::controls) return;
-  const int32_t* items = pieces_near(map, place, set).items.data();
+  const int32_t* items = items_near(map, place, set).data();
   for (int line = 0; line < kLines; ++line) prefetch(items, line * kLineBytes);
 }
 
@@ -299,8 +315,8 @@ struct StepObservation {
 
 /// Writes one entity set. It is empty if it is hidden, or if the agent is absent or was halted in an earlier step.
 template <typename Observation>
-PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& place, EntitySet set,
-                            const SetRows& out, const Observation& observation) {
+PICTURA_HD void observe_set(const WorldView& world, int agent, NearPlace place, EntitySet set, const SetRows& out,
+                            const Observation& observation) {
   const int slot = world.first_slot + agent;
   int count = 0;
   if (observes_set(world, agent, set, hidden_from(world, agent))) {
@@ -308,9 +324,10 @@ PICTURA_HD void observe_set(const WorldView& world, int agent, const NearPlace& 
     if (set == EntitySet::partners) {
       count = observation.observe_partners(world, agent, frame, out.rows, SingleThread{});
     } else if (set == EntitySet::controls) {
-      count = observe_controls(world, slot, place, frame, out.rows);
+      count = observe_controls(world, slot, items_near(world.map, place, set), frame, out.rows);
     } else {
-      count = observe_pieces(pieces_near(world.map, place, set), frame, out.capacity, out.rows);
+      const PieceList near = piece_list(world.map, set, items_near(world.map, place, set));
+      count = observe_pieces(near, frame, out.capacity, out.rows);
     }
   }
   const int end = observation.num_filled(out) * out.features;

@@ -265,7 +265,7 @@ TEST(ObservedLists, HoldAllPiecesInSight) {
     const float heading_rad = random.uniform(-kPi, kPi);
     const EgoFrame frame{{at.x, at.y, 0}, {cos_of(heading_rad), sin_of(heading_rad)}};
     std::vector<uint8_t> is_listed(rules.boundary_pieces.size());
-    for (const int32_t item : list_of(view.near_boundary_pieces, near_place(view, at, heading_rad).cell_and_sector())) {
+    for (const int32_t item : list_of(view.near_boundary_pieces, near_place(view, at, heading_rad).cell_and_sector)) {
       is_listed[item] = 1;
     }
     for (size_t k = 0; k < is_listed.size(); ++k) {
