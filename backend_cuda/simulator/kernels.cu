@@ -144,10 +144,16 @@ __global__ void __launch_bounds__(kThreads) run_threads(int32_t count, Phase pha
 // last warp ends.
 constexpr int kGroupThreads = 64;
 // Blocks per multiprocessor. They leave fewer registers than the compiler would choose, but hide more latency.
-constexpr int kGroupBlocks = 10, kObserveBlocks = 16;
+template <typename Phase>
+constexpr int kGroupBlocks = 10;
+template <>
+constexpr int kGroupBlocks<ApplyRewardAndHalt> = 16;
+template <typename CommandType>
+constexpr int kGroupBlocks<FinishStep<CommandType>> = 6;  // a world has only one warp
+constexpr int kObserveBlocks = 16;
 
 template <int kGroup, typename Phase>
-__global__ void __launch_bounds__(kGroupThreads, kGroupBlocks) run_groups(int32_t count, Phase phase) {
+__global__ void __launch_bounds__(kGroupThreads, kGroupBlocks<Phase>) run_groups(int32_t count, Phase phase) {
   wait_for_earlier_launch();
   const int64_t item = (int64_t{blockIdx.x} * kGroupThreads + threadIdx.x) / kGroup;
   if (item < count) phase(DeviceThreadGroup<kGroup>{}, static_cast<int32_t>(item));
