@@ -58,9 +58,10 @@ void ParameterVisitor::numbers_by_name(const NamedOption& option, std::vector<st
 
 std::string ParameterVisitor::current_name(const NamedOption& option, const std::string& name) {
   if (!option.renamed.old_name || name != option.renamed.old_name) return name;
-  const std::string warning = fmt::format("{}: '{}' is deprecated: use '{}'", option.name, name, option.renamed.name);
   // Where warnings are errors, the call raises.
-  if (PyErr_WarnEx(PyExc_DeprecationWarning, warning.c_str(), 1) != 0) throw py::error_already_set();
+  if (PyErr_WarnEx(PyExc_DeprecationWarning, option.renamed.warning(option.name).c_str(), 1) != 0) {
+    throw py::error_already_set();
+  }
   return option.renamed.name;
 }
 

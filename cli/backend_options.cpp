@@ -23,7 +23,7 @@ CLI::Validator one_of(const std::vector<std::string>& names) {
 std::function<std::string(std::string)> renaming(const std::string& flag, const RenamedChoice& renamed) {
   return [flag, renamed](const std::string& text) -> std::string {
     if (text != renamed.old_name) return text;
-    print_message("warning: {}: '{}' is deprecated: use '{}'\n", flag, text, renamed.name);
+    print_message("warning: {}\n", renamed.warning(flag));
     return renamed.name;
   };
 }

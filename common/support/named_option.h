@@ -11,6 +11,11 @@ namespace pictura {
 /// Old name of a choice. Commands and Python accept it with a warning until the next version.
 struct RenamedChoice {
   const char *old_name = nullptr, *name = nullptr;
+
+  /// Warning for an option whose value is the old name.
+  std::string warning(const std::string& option) const {
+    return option + ": '" + old_name + "' is deprecated: use '" + name + "'";
+  }
 };
 
 struct NamedOption {
