@@ -94,6 +94,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.value("policy.backbone_layers", c.policy.backbone_layers, 1, 64);
   v.value("policy.backbone_width", c.policy.backbone_width, 1, 1 << 14);
   v.value("policy.layer_norm", c.policy.layer_norm);
+  v.value("policy.conv_norm", c.policy.conv_norm);
   v.value("policy.residual", c.policy.residual);
   v.value("policy.decision_steps", c.policy.decision_steps, 1, kMaxDecisionSteps);
 

@@ -687,6 +687,16 @@ at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at
   return BiasGelu<false>::apply(rows, bias).permute({0, 3, 1, 2});
 }
 
+at::Tensor convolve_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride) {
+  const int64_t padding = weight.size(2) / 2, missing = x.size(1) - weight.size(1);
+  const at::Tensor padded = missing > 0 ? at::constant_pad_nd(weight, {0, 0, 0, 0, 0, missing}) : weight;
+  const bool is_fused = x.is_cuda() && NetworkPasses::supports_norm(bias.size(0));
+  const at::Tensor rows = at::conv2d(x, padded, is_fused ? std::optional<at::Tensor>() : bias, {stride}, {padding})
+                              .permute({0, 2, 3, 1})
+                              .contiguous();
+  return (is_fused ? BiasGelu<true>::apply(rows, bias) : gelu(normalize(rows))).permute({0, 3, 1, 2});
+}
+
 at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tensor& weight, const at::Tensor& bias) {
   if (!is_supported(x) || !NetworkPasses::supports_norm(x.size(-1))) {
     return at::layer_norm(position.defined() ? x + position : x, {x.size(-1)}, weight, bias);

@@ -248,7 +248,8 @@ class PerspectiveEncoder final : public SceneEncoder {
     for (size_t i = 0; i < convolutions_.size(); ++i) {
       // Pixels are 0 to 255. Scaling the few weights is cheaper than scaling the pixels.
       const at::Tensor weight = i == 0 ? convolutions_[i].weight / 255.0 : convolutions_[i].weight;
-      x = convolve_gelu(x, weight, convolutions_[i].bias, config_.conv_strides[i]);
+      const auto layer = config_.conv_norm ? convolve_norm_gelu : convolve_gelu;
+      x = layer(x, weight, convolutions_[i].bias, config_.conv_strides[i]);
     }
     return x;
   }

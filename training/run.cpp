@@ -236,6 +236,7 @@ void Run::load_policy(const SavedPolicy& other) {
   for (const auto& [key, got, expected] :
        {std::tuple{"policy.segment_features", other.config.policy.segment_features, config.policy.segment_features},
         std::tuple{"policy.layer_norm", other.config.policy.layer_norm, config.policy.layer_norm},
+        std::tuple{"policy.conv_norm", other.config.policy.conv_norm, config.policy.conv_norm},
         std::tuple{"policy.residual", other.config.policy.residual, config.policy.residual}}) {
     PICTURA_CHECK(got == expected, "{}: has a different architecture: {}: expected {}, got {}", other.path, key,
                   expected, got);
