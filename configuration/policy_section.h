@@ -34,7 +34,7 @@ struct PolicySection {
   bool backbone_frozen = true;  // keeps the backbone's weights fixed
   int backbone_layers = 4, backbone_width = 512;
   bool layer_norm = false;  // see docs/explanation/network.md
-  bool conv_norm = false;   // a layer norm without parameters between each convolution and its GELU
+  bool conv_norm = false;   // layer norms without parameters between convolutions and their GELU
   bool residual = false;    // every trunk layer except the first adds its input
   int decision_steps = 1;   // see policy/decision_clock.h
 };

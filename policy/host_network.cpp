@@ -43,12 +43,10 @@ struct Dense {
       for (int64_t c = 0; c < out; ++c) to[row * out + c] += bias[c];
     }
   }
-  void apply_gelu(const float* x, int64_t rows, float* to) const {
+  /// has_norm: whether a layer norm precedes the GELU.
+  void apply_gelu(const float* x, int64_t rows, float* to, bool has_norm = false) const {
     host::multiply({x, in}, weight.data(), rows, in, out, to);
-    host::bias_gelu(to, bias.data(), rows, out, to, nullptr);
-  }
-  void apply_norm_gelu(const float* x, int64_t rows, float* to) const {
-    host::multiply({x, in}, weight.data(), rows, in, out, to);
+    if (!has_norm) return host::bias_gelu(to, bias.data(), rows, out, to, nullptr);
     host::bias_norm(to, bias.data(), rows, out, to, nullptr);
     const Numbers zeros(static_cast<size_t>(out));
     host::bias_gelu(to, zeros.data(), rows, out, to, nullptr);
@@ -60,12 +58,7 @@ struct Group {
   Dense hidden, out;
   bool layer_norm = false;
 
-  void apply_hidden(const float* x, int64_t rows, float* to) const {
-    if (layer_norm)
-      hidden.apply_norm_gelu(x, rows, to);
-    else
-      hidden.apply_gelu(x, rows, to);
-  }
+  void apply_hidden(const float* x, int64_t rows, float* to) const { hidden.apply_gelu(x, rows, to, layer_norm); }
   Numbers encode(const float* x, int64_t rows) const {
     Numbers activations(static_cast<size_t>(rows * hidden.out)), result(static_cast<size_t>(rows * out.out));
     apply_hidden(x, rows, activations.data());
@@ -356,7 +349,7 @@ class ImageEncoder {
         taps = unfolded;
       }
       float* const next = room(&scratch->next, size.pixels() * convolutions_[i].out);
-      convolutions_[i].apply_gelu(taps, size.pixels(), next);
+      convolutions_[i].apply_gelu(taps, size.pixels(), next, config_.conv_norm);
       std::swap(scratch->images, scratch->next);
       x = next;
     }

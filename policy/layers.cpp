@@ -661,9 +661,19 @@ at::Tensor linear_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const
   return BiasGelu<true>::apply(at::linear(x, weight), bias);
 }
 
+namespace {
+
+// Returns a convolution's weight with zeros for its missing last input channels.
+at::Tensor with_all_inputs(const at::Tensor& weight, int64_t channels) {
+  const int64_t missing = channels - weight.size(1);
+  return missing > 0 ? at::constant_pad_nd(weight, {0, 0, 0, 0, 0, missing}) : weight;
+}
+
+}  // namespace
+
 at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride) {
-  const int64_t padding = weight.size(2) / 2, missing = x.size(1) - weight.size(1);
-  const at::Tensor padded = missing > 0 ? at::constant_pad_nd(weight, {0, 0, 0, 0, 0, missing}) : weight;
+  const int64_t padding = weight.size(2) / 2;
+  const at::Tensor padded = with_all_inputs(weight, x.size(1));
   if (is_on_host(x)) {
     const auto channels_last = [](const at::Tensor& t) { return t.permute({0, 2, 3, 1}).contiguous(); };
     const auto convolve = [&]<typename Convolution>(const at::Tensor& images) {
@@ -688,8 +698,8 @@ at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at
 }
 
 at::Tensor convolve_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride) {
-  const int64_t padding = weight.size(2) / 2, missing = x.size(1) - weight.size(1);
-  const at::Tensor padded = missing > 0 ? at::constant_pad_nd(weight, {0, 0, 0, 0, 0, missing}) : weight;
+  const int64_t padding = weight.size(2) / 2;
+  const at::Tensor padded = with_all_inputs(weight, x.size(1));
   const bool is_fused = x.is_cuda() && NetworkPasses::supports_norm(bias.size(0));
   const at::Tensor rows = at::conv2d(x, padded, is_fused ? std::optional<at::Tensor>() : bias, {stride}, {padding})
                               .permute({0, 2, 3, 1})

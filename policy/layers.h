@@ -20,7 +20,7 @@ at::Tensor linear_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const
 /// Returns GELU(convolution), padded by half the kernel. x: [n, in, height, width]; weight: [out, in, kernel, kernel];
 /// bias: [out]. The weight may lack the last input channels if x is 0 there.
 at::Tensor convolve_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride);
-/// Returns GELU(layer norm over channels(convolution)). Shapes as in convolve_gelu().
+/// Returns GELU(normalize(convolution)), with the norm over channels. Shapes as in convolve_gelu().
 at::Tensor convolve_norm_gelu(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias, int64_t stride);
 
 /// Returns the layer norm of (x + position) over the last dimension. x: [..., period, channels]; position: [period,

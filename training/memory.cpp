@@ -140,7 +140,9 @@ void add_images(const Config& config, const Rig& rig, LayerSum* sum) {
   sum->add_values(pixels * channels, 1);
   for (size_t i = 0; i < policy.conv_channels.size() && !is_program; ++i) {
     pixels /= policy.conv_strides[i] * policy.conv_strides[i];
-    sum->add(pixels, channels, policy.conv_channels[i], 2, policy.conv_kernels[i] * policy.conv_kernels[i]);
+    const bool keeps_norm = policy.conv_norm && !NetworkPasses::supports_norm(policy.conv_channels[i]);
+    sum->add(pixels, channels, policy.conv_channels[i], keeps_norm ? 3 : 2,
+             policy.conv_kernels[i] * policy.conv_kernels[i]);
     channels = policy.conv_channels[i];
   }
   const double width = channels, rows = cameras * queries, scores = pixels * queries * policy.attention_heads;

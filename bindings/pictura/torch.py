@@ -177,6 +177,7 @@ class Policy(nn.Module):
         self.num_cameras = num_cameras
         if self.modality == "perspective":
             self.patch_px, self.strides = config["patch_px"], list(config["conv_strides"])
+            self.conv_norm = bool(config.get("conv_norm", False))
             channels = [3 * self.patch_px**2, *config["conv_channels"]]
             self.conv = nn.ModuleList(
                 nn.Conv2d(i, o, kernel, stride, kernel // 2)
@@ -302,7 +303,10 @@ class Policy(nn.Module):
         for i, layer in enumerate(self.conv):
             # The weights of the first layer are divided by 255 instead of the pixels.
             weight = layer.weight / 255.0 if i == 0 else layer.weight
-            x = functional.gelu(functional.conv2d(x, weight, layer.bias, layer.stride, layer.padding))
+            x = functional.conv2d(x, weight, layer.bias, layer.stride, layer.padding)
+            if self.conv_norm:
+                x = _normalize(x.permute(0, 2, 3, 1)).permute(0, 3, 1, 2)
+            x = functional.gelu(x)
         return x.unflatten(0, (pixels.shape[1], -1))
 
 

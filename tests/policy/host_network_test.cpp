@@ -239,6 +239,7 @@ TEST(HostNetwork, ComputesEveryArchitecture) {
       config.policy = test::tiny_section(modality);
       config.policy.layer_norm = choice & 1;
       config.policy.residual = choice & 2;
+      config.policy.conv_norm = choice & 2;
       config.policy.point_features = choice & 4;
       config.policy.segment_features = !(choice & 1);
       config.policy.attention_mlp = choice & 2 ? 0 : 5;

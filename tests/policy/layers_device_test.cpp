@@ -116,15 +116,23 @@ TEST_P(DeviceLayers, NormalizeKeepsTheTypeOfActivations) {
 }
 
 TEST_P(DeviceLayers, ConvolveGelu) {
-  for (const int64_t stride : {1, 2}) {
-    const auto layer = [stride](const auto& in) {
-      return convolve_gelu(in[0].contiguous(at::MemoryFormat::ChannelsLast), in[1], in[2], stride);
-    };
-    const auto plain = [stride](const auto& in) {
-      return gelu(at::conv2d(in[0].narrow(1, 0, 12), in[1], in[2], {stride}, {1}));
-    };
-    expect_as_on_the_host(layer, plain,
-                          {numbers({5, 16, 9, 12}, 1), 0.1 * numbers({32, 12, 3, 3}, 2), numbers({32}, 3)}, 1);
+  for (const bool has_norm : {false, true}) {
+    for (const int64_t stride : {1, 2}) {
+      const auto layer = [&](const auto& in) {
+        const at::Tensor x = in[0].contiguous(at::MemoryFormat::ChannelsLast);
+        return (has_norm ? convolve_norm_gelu : convolve_gelu)(x, in[1], in[2], stride);
+      };
+      const auto plain = [&](const auto& in) {
+        at::Tensor x = at::conv2d(in[0].narrow(1, 0, 12), in[1], in[2], {stride}, {1}).permute({0, 2, 3, 1});
+        if (has_norm) x = at::layer_norm(x, {x.size(-1)}).to(x.scalar_type());
+        return gelu(x).permute({0, 3, 1, 2});
+      };
+      // 64: fused with the norm; 32: ATen's own norm.
+      for (const int64_t out : {32, 64}) {
+        expect_as_on_the_host(layer, plain,
+                              {numbers({5, 16, 9, 12}, 1), 0.1 * numbers({out, 12, 3, 3}, 2), numbers({out}, 3)}, 1);
+      }
+    }
   }
 }
 

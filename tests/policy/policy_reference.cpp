@@ -89,6 +89,8 @@ int main(int argc, char** argv) try {
   config.policy.attention_mlp = 0;
   config.policy.num_queries = 3;
   pictura::write_reference(argv[1], "patches", config);
+  config.policy.conv_norm = true;
+  pictura::write_reference(argv[1], "normalized_convolutions", config);
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "error: %s\n", error.what());

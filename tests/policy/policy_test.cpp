@@ -130,11 +130,11 @@ TEST(Policy, GradientsOfPatchesEqualDifferenceQuotients) {
 
 TEST_P(BothModalities, GradientsOfNormalizedLayersEqualDifferenceQuotients) {
   PolicySection section = tiny_section(GetParam());
-  section.layer_norm = section.residual = true;
+  section.layer_norm = section.conv_norm = section.residual = true;
   section.backbone_layers = 3;
   const PolicyNetwork policy(section, 3, 5, at::kDouble);
   expect_gradients(policy, observation(GetParam(), 2));
-  section.layer_norm = section.residual = false;
+  section.layer_norm = section.conv_norm = section.residual = false;
   EXPECT_EQ(policy.hash(), PolicyNetwork(section, 3, 5, at::kDouble).hash())
       << "norms and residuals have no parameters";
 }
