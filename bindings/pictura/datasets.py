@@ -19,6 +19,7 @@ import numpy as np
 import pictura
 
 _MAX_BYTES = 1 << 28
+_MIN_VALUES = 1_000_000  # accepted from pickles of any size
 _NUMPY = re.compile(r"numpy\.(_?core\.(multiarray|numeric)\.)?(\w+)")
 
 
@@ -28,6 +29,24 @@ def _plain_values(data: bytes) -> Any:
     Stand-ins replace the callables that the pickle names. New stand-ins are created for every pickle, because a pickle
     can modify the objects that it names.
     """
+
+    # A pickle can refer to a value again with a few bytes, so that nested references stand for any number of values.
+    # Values that are written out are counted at most twice, and have at least one byte each.
+    max_values, num_values = 2 * len(data) + _MIN_VALUES, 0
+
+    def count(values: int) -> None:
+        nonlocal num_values
+        num_values += values
+        if num_values > max_values:
+            raise pickle.UnpicklingError(f"expected at most {max_values} values in {len(data)} bytes, got more")
+
+    def encoded(text: str, _: Any) -> bytes:
+        count(len(text))
+        return text.encode("latin1")
+
+    def set_of(values: Any = ()) -> set:
+        count(len(values))
+        return set(values)
 
     class Type:
         def __init__(self, name: str, *_: Any) -> None:
@@ -43,7 +62,7 @@ def _plain_values(data: bytes) -> Any:
                 return list(data)
             if not isinstance(data, (bytes, bytearray)):
                 raise pickle.UnpicklingError(f"expected an array's bytes, got {type(data).__name__}")
-            return np.frombuffer(bytes(data), np.dtype(self.order + self.name)).reshape(shape, order=order)
+            return np.frombuffer(data, np.dtype(self.order + self.name)).reshape(shape, order=order)
 
     class Array:
         value: Any = None
@@ -64,11 +83,12 @@ def _plain_values(data: bytes) -> Any:
         "numpy _frombuffer": from_buffer,
         "numpy scalar": lambda type_, data: type_.array((), data, "C")[()],
         # Before protocol 3, pickles encode bytes with this function.
-        "_codecs.encode": lambda text, _: text.encode("latin1"),
+        "_codecs.encode": encoded,
         "builtins.bytes": lambda: b"",
         "collections.defaultdict": lambda *_: {},
         "collections.OrderedDict": lambda *_: {},
-        **{f"builtins.{kind.__name__}": kind for kind in (int, float, set)},
+        "builtins.set": set_of,
+        **{f"builtins.{kind.__name__}": kind for kind in (int, float)},
     }
 
     # Python's unpickler is half as fast as the C unpickler. But the C unpickler allocates memory for as many memoized
@@ -85,6 +105,7 @@ def _plain_values(data: bytes) -> Any:
     def unwrapped(value: Any, depth: int = 0) -> Any:
         if depth > 20:
             raise pickle.UnpicklingError("expected values nested at most 20 deep, got deeper values")
+        count(1)
         if isinstance(value, Array):
             return unwrapped(value.value, depth + 1)
         if isinstance(value, dict):
@@ -533,13 +554,15 @@ def from_py123d(scene: Any, *, radius_m: float = 200.0) -> pictura.Scenario:
 
     radius_m: maps of whole towns are cropped to this radius around the self-driving car's position at the scene's
     current step. The result has road users, lines, edges, crosswalks, stop signs, lights, and lanes with links,
-    neighbours, speed limits, and widths from their boundaries. Raises pictura.Error, which names the scene and the
-    part.
+    neighbours, speed limits, and widths from their boundaries. Raises pictura.UsageError for other objects, and
+    pictura.Error, which names the scene and the part.
 
     Examples:
         >>> from pictura.datasets import from_py123d # doctest: +SKIP
         >>> scene = from_py123d(scene_of_py123d, radius_m=150) # doctest: +SKIP
     """
+    if not hasattr(scene, "get_scene_metadata"):
+        raise pictura.UsageError(f"from_py123d: expected a scene of py123d, got {type(scene).__name__}")
     metadata = scene.get_scene_metadata()
     place = f"{metadata.dataset}: {metadata.initial_uuid}"
     iterations = range(-metadata.num_history_iterations, metadata.num_future_iterations + 1)

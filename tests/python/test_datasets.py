@@ -2,6 +2,7 @@
 py123d's.
 """
 
+import codecs
 import os
 import pathlib
 import pickle
@@ -180,6 +181,19 @@ def test_large_claimed_sizes_in_pickles_allocate_no_memory(tmp_path):
         assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000, data
 
 
+def test_repeated_references_in_pickles_allocate_no_memory(tmp_path):
+    nested: list = []
+    for _ in range(15):
+        nested = [nested] * 20  # 20 to the power of 15 values in 700 bytes
+    text, items = "x" * 1_000_000, list(range(1_000_000))
+    calls = [Runs(codecs.encode, text, "latin1") for _ in range(1000)], [Runs(set, items) for _ in range(1000)]
+    for value in (nested, *calls):
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        with pytest.raises(pictura.Error, match=r"expected at most \d+ values in \d+ bytes"):
+            load_scenarionet(written(tmp_path, value))
+        assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 400_000
+
+
 def test_errors_name_damaged_pickles(tmp_path):
     whole = pickle.dumps(scene_of(), 4)
     draw = np.random.default_rng(1)
@@ -341,6 +355,8 @@ def test_scenes_of_py123d_become_scenes():
     for missing, message in (("map", "mine: ab: expected a scene with a map"), ("car", "mine: ab: expected a scene with a self-driving car")):
         with pytest.raises(pictura.Error, match=message):
             from_py123d(scene_123d((missing,)))
+    with pytest.raises(pictura.UsageError, match="expected a scene of py123d, got str"):
+        from_py123d("nuplan")
 
 
 def test_scenes_of_py123d_have_the_attributes_that_are_read():
