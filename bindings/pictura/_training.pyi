@@ -157,7 +157,8 @@ def evaluate_scenes(checkpoint: str, scenes: collections.abc.Sequence[str], *, p
     checkpoint: file of a policy; '' with `controller`.
     scenes: files, folders, or 'FILE#K' for scene K of a file.
     protocol: 'womd', 'gpudrive', 'pufferdrive2', 'pufferdrive3', 'waymax' or 'simagents'.
-    controller: driver instead of the policy: 'log', 'inverse', 'idm', 'idm_lanes', 'random' or 'idle'.
+    controller: driver instead of the policy: 'log', 'inverse', 'idm', 'idm_lanes', 'random', 'idle', or a function as in
+    evaluate().
     control, start_step, steps, densities (shares of road users that remain), rules (dict of values): settings that replace
     those of the protocol (docs/explanation/evaluation.md).
     first_scene, num_scenes: range of scenes; num_scenes 0: all from the first on.
