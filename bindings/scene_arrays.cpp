@@ -120,7 +120,9 @@ class ArrayReader {
       const bool is_last = i + 1 == array.size();
       if (array.data()[i] >= minimum && array.data()[i] <= most && (!is_last || array.data()[i] == total)) continue;
       fail_usage("{}: expected {}, got {}", place(key, i),
-                 is_last ? fmt::format("{}, the number of elements", total) : fmt::format("{} to {}", minimum, most),
+                 is_last  ? fmt::format("{}, the number of elements", total)
+                 : i == 0 ? "0"
+                          : fmt::format("{} to {}", minimum, most),
                  array.data()[i]);
     }
     return array;

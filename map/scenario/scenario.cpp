@@ -127,8 +127,8 @@ void validate(const Scenario& scenario) {
                   "num_steps: expected 1 to {}, got {}", kMaxScenarioSteps, scenario.num_steps);
     PICTURA_CHECK(scenario.current_step >= 0 && scenario.current_step < scenario.num_steps,
                   "current_step: expected a step in [0, {}), got {}", scenario.num_steps, scenario.current_step);
-    PICTURA_CHECK(scenario.dt_s > 1e-3f && scenario.dt_s < 10.0f, "dt_s: expected 0.001 to 10 s, got {}",
-                  scenario.dt_s);
+    PICTURA_CHECK(scenario.dt_s > 1e-3f && scenario.dt_s < 10.0f,
+                  "dt_s: expected more than 0.001 s and less than 10 s, got {}", scenario.dt_s);
     PICTURA_CHECK(scenario.tracks.size() <= kMaxScenarioTracks, "tracks: expected at most {}, got {}",
                   kMaxScenarioTracks, scenario.tracks.size());
     const std::size_t steps = static_cast<std::size_t>(scenario.num_steps);

@@ -350,7 +350,8 @@ class Decoder {
       const auto intervals = static_cast<double>(timestamps_.size() - 1);
       scene_.dt_s = (timestamps_.back() - timestamps_.front()) / intervals;
       if (!(scene_.dt_s > 1e-3 && scene_.dt_s < 10)) {
-        fail_field("timestamps_seconds", "expected steps of 0.001 to 10 s, got a mean of {:g} s", scene_.dt_s);
+        fail_field("timestamps_seconds", "expected steps of more than 0.001 s and less than 10 s, got a mean of {:g} s",
+                   scene_.dt_s);
       }
       for (std::size_t i = 1; i < timestamps_.size(); ++i) {
         if (!(timestamps_[i] > timestamps_[i - 1])) {

@@ -383,7 +383,7 @@ def with_nan(path: str, index: tuple) -> np.ndarray:
         ("stop_signs.lanes_begin", [0], r"stop_signs\['lanes_begin'\]: expected shape \[2\], got \[1\]"),
         ("sdc_track", 2, r"sdc_track: expected a track in \[0, 2\), got 2"),
         ("current_step", 21, r"current_step: expected a step in \[0, 21\), got 21"),
-        ("dt_s", 0, r"dt_s: expected 0.001 to 10 s, got 0"),
+        ("dt_s", 0, r"dt_s: expected more than 0.001 s and less than 10 s, got 0"),
         ("tolerance_m", -1, r"tolerance_m: expected a number in \[0, 1\], got -1"),
         ("origin_m", [0, 0, 0], r"within 10000 m of the map's centre"),
     ],
