@@ -9,6 +9,7 @@
 
 #include "pictura/common/error.h"
 #include "pictura/common/scene.h"
+#include "pictura/map/endless_lanes.h"
 #include "pictura/map/scenario/conversion.h"
 #include "pictura/map/speed_limit.h"
 
@@ -246,7 +247,8 @@ int32_t longest_neighbor(Conversion* conversion, const std::vector<LoggedNeighbo
   return best;
 }
 
-/// Sets the neighbours of lanes. Two lanes become neighbours if each refers to the other.
+/// Sets the neighbours of lanes. Two lanes become neighbours if each refers to the other, and if their types are equal
+/// or, in authored scenes, those of routes.
 void set_neighbors(Conversion* conversion) {
   RoadMap& map = conversion->out->map;
   std::vector<int32_t> left(map.lanes.size()), right(map.lanes.size());
@@ -258,7 +260,9 @@ void set_neighbors(Conversion* conversion) {
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     const int32_t other = left[i];
     if (other < 0 || right[other] != static_cast<int32_t>(i)) continue;
-    if (map.lanes[i].type != map.lanes[other].type) continue;
+    const LaneType type = map.lanes[i].type, other_type = map.lanes[other].type;
+    const bool are_authored_routes = conversion->scene.is_authored && is_route(type) && is_route(other_type);
+    if (type != other_type && !are_authored_routes) continue;
     // Skips neighbours that would form a ring, because a ring has no leftmost lane.
     int32_t leftmost = other;
     while (leftmost >= 0 && leftmost != static_cast<int32_t>(i)) {

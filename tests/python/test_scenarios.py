@@ -319,6 +319,18 @@ def test_a_scene_has_the_content_of_its_arrays(tmp_path):
     np.testing.assert_array_equal(every["points"], given["lanes"]["points"])
 
 
+@pytest.mark.parametrize(("right", "are_neighbors"), [("driving", True), ("ramp", True), ("sidewalk", False)])
+def test_neighbors_of_arrays_have_the_same_type_or_are_routes(right, are_neighbors):
+    line = np.array([(0, 0, 0), (50, 0, 0)], float)
+    lanes = {"id": [7, 8], "type": [pictura.LANE_TYPES.index(kind) for kind in ("driving", right)], "points": np.concatenate([line, line - (0, 3.5, 0)]),
+             "begin": [0, 2, 4], "left_neighbor": [-1, 7], "right_neighbor": [8, -1]}  # fmt: skip
+    track = {"id": [1], "type": [1], "size_m": np.ones((1, 3)), "valid": np.ones((1, 2), bool), "position_m": np.zeros((1, 2, 3)),
+             "heading_rad": np.zeros((1, 2)), "velocity_mps": np.zeros((1, 2, 2))}  # fmt: skip
+    kept = pictura.Scenario.from_arrays(track, lanes).to_arrays()["lanes"]
+    assert kept["left_neighbor"].tolist() == ([-1, 7] if are_neighbors else [-1, -1])
+    assert kept["right_neighbor"].tolist() == ([8, -1] if are_neighbors else [-1, -1])
+
+
 def test_recordings_read_back_equal_from_their_arrays(folder, scene):
     for name in ("womd.tfrecord", "gpudrive.json", "pufferdrive_v1.bin", "pufferdrive_v3c.bin"):
         recorded = pictura.Scenario.load(str(folder / name))
