@@ -118,26 +118,29 @@ void make_tracks(Conversion* conversion) {
     PICTURA_CHECK(logged.states.size() == steps, "{}: {}: expected {} states, got {}", scene.source, place, steps,
                   logged.states.size());
     RecordedTrack track{.id = logged.id, .type = logged.type, .control = logged.control, .first_valid = -1};
-    const LoggedState* last = nullptr;
     for (std::size_t step = 0; step < steps; ++step) {
       if (!logged.states[step].valid) continue;
-      last = &logged.states[step];
       if (track.first_valid < 0) track.first_valid = static_cast<int32_t>(step);
       track.last_valid = static_cast<int32_t>(step);
       ++track.num_valid;
     }
-    if (!last) {
+    if (track.num_valid == 0) {
       scene.note("tracks without a valid state left out", place);
       continue;
     }
-    track.length_m = static_cast<float>(last->length_m);
-    track.width_m = static_cast<float>(last->width_m);
-    track.height_m = static_cast<float>(last->height_m);
+    // A present step outside of the scene is refused later.
+    const bool is_present = scene.current_step >= 0 && scene.current_step < scene.num_steps &&
+                            logged.states[static_cast<std::size_t>(scene.current_step)].valid;
+    const auto sized = static_cast<std::size_t>(is_present ? scene.current_step : track.last_valid);
+    const LoggedState& its_size = logged.states[sized];
+    track.length_m = static_cast<float>(its_size.length_m);
+    track.width_m = static_cast<float>(its_size.width_m);
+    track.height_m = static_cast<float>(its_size.height_m);
     for (const auto& [field, size_m] : {std::pair{"length", track.length_m}, std::pair{"width", track.width_m},
                                         std::pair{"height", track.height_m}}) {
       PICTURA_CHECK(size_m > 0 && size_m <= kMaxTrackSize_m,
-                    "{}: {}: {}: expected a number in (0, {}] at its last valid state (step {}), got {}", scene.source,
-                    place, field, kMaxTrackSize_m, track.last_valid, size_m);
+                    "{}: {}: {}: expected a number in (0, {}] at step {}, got {}", scene.source, place, field,
+                    kMaxTrackSize_m, sized, size_m);
     }
     for (std::size_t step = 0; step < steps; ++step) {
       const LoggedState& state = logged.states[step];
@@ -149,7 +152,7 @@ void make_tracks(Conversion* conversion) {
       Eigen::Vector3d p = conversion->rounded(conversion->from_origin(state.center_m));
       check_radius(*conversion, fmt::format("{}: step {}", place, step), p);
       // Recorded sizes vary along a track, so the bottom face is half of the current step's height below the centre.
-      if (!scene.is_authored) p.z() -= 0.5 * (state.height_m > 0 ? state.height_m : last->height_m);
+      if (!scene.is_authored) p.z() -= 0.5 * (state.height_m > 0 ? state.height_m : its_size.height_m);
       out.states.push_back({to_vec3(p),
                             wrapped(state.heading_rad),
                             {static_cast<float>(state.velocity_x_mps), static_cast<float>(state.velocity_y_mps)}});

@@ -41,7 +41,7 @@ struct RecordedTrack {
   int64_t id = 0;
   TrackType type = TrackType::unset;
   RecordedControl control = RecordedControl::unstated;
-  float length_m = 0, width_m = 0, height_m = 0;  // in the last valid state
+  float length_m = 0, width_m = 0, height_m = 0;  // at current_step if valid there, else in the last valid state
   int32_t first_valid = 0, last_valid = 0;        // the track may have gaps between these steps
   int32_t num_valid = 0;                          // at least one
 };

@@ -130,8 +130,10 @@ TEST(Womd, FaultyFieldsAreNamed) {
             record + "tracks[3].states[4].center_x: expected a finite number, got nan");
   EXPECT_THAT(reason_of([&](LoggedScene* scene) { scene->lanes[2].points[5].y() = kNan; }),
               AllOf(HasSubstr(record), HasSubstr("map_features[2].lane.polyline[5].y: expected a finite number")));
-  EXPECT_EQ(reason_of([](LoggedScene* scene) { scene->tracks[1].states.back().width_m = 0; }),
-            record + "tracks[1]: width: expected a number in (0, 100] at its last valid state (step 11), got 0");
+  EXPECT_EQ(reason_of([](LoggedScene* scene) { scene->tracks[1].states[10].width_m = 0; }),
+            record + "tracks[1]: width: expected a number in (0, 100] at step 10, got 0");
+  // Only the size at the current step counts.
+  EXPECT_EQ(reason_of([](LoggedScene* scene) { scene->tracks[1].states.back().width_m = 0; }), test::kNoError);
   EXPECT_EQ(reason_of([](LoggedScene* scene) { scene->sdc_track = 99; }),
             record + "sdc_track_index: expected an index in [0, 12), got 99");
   EXPECT_EQ(reason_of([](LoggedScene* scene) { scene->predictions[1].first = -4; }),
