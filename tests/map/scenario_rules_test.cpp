@@ -222,8 +222,9 @@ TEST(LightRules, LanesOfOneStopPointWithEqualStatesAreOneLight) {
   EXPECT_GT(way.y, 0) << "traffic comes westwards, so the left end is the southern one";
 }
 
-TEST(TrackRules, SizesAreThoseOfTheLastValidState) {
+TEST(TrackRules, SizesAreThoseOfTheCurrentStep) {
   LoggedScene scene = small_scene();
+  scene.current_step = 1;
   scene.tracks[0].states[0].length_m = 9;
   scene.tracks[0].states[1].height_m = 3;
   scene.tracks[0].states[1].center_m.z() = 2;
@@ -233,6 +234,9 @@ TEST(TrackRules, SizesAreThoseOfTheLastValidState) {
   EXPECT_EQ(scenario.states[0].position_m.z, -0.75f);
   EXPECT_EQ(scenario.states[1].position_m.z, 0.5f);
   EXPECT_NEAR(scenario.states[1].heading_rad, 4 - 2 * kPi, 1e-6);
+  // The last valid state counts if the track is absent at the current step.
+  for (size_t step = 1; step < scene.tracks[0].states.size(); ++step) scene.tracks[0].states[step].valid = false;
+  EXPECT_EQ(make_scenario(scene).tracks[0].length_m, 9);
 }
 
 TEST(TrackRules, TracksWithoutValidStatesAreLeftOut) {
