@@ -140,7 +140,7 @@ __global__ void __launch_bounds__(kThreads) run_threads(int32_t count, Phase pha
   if (item < count) phase(DeviceAtomics{}, static_cast<int32_t>(item));
 }
 
-// Threads of blocks of groups. Blocks are small, because a block occupies its place on the multiprocessor until its
+// Threads per block of groups. Blocks are small, because a block occupies its place on the multiprocessor until its
 // last warp ends.
 constexpr int kGroupThreads = 64;
 // Blocks per multiprocessor. They leave fewer registers than the compiler would choose, but hide more latency.
@@ -159,7 +159,7 @@ __global__ void __launch_bounds__(kGroupThreads, kGroupBlocks<Phase>) run_groups
   if (item < count) phase(DeviceThreadGroup<kGroup>{}, static_cast<int32_t>(item));
 }
 
-/// Groups with memory of their own.
+/// Kernel of groups that have memory of their own.
 template <typename Phase>
 __global__ void __launch_bounds__(kGroupThreads, kObserveBlocks) run_staged_groups(int32_t count, Phase phase) {
   __shared__ float4 staging[kGroupThreads / kWarp][Phase::kStaging / 4];
@@ -171,7 +171,8 @@ __global__ void __launch_bounds__(kGroupThreads, kObserveBlocks) run_staged_grou
   if (item < count) phase(group, static_cast<int32_t>(item));
 }
 
-/// Returns world number `turn` of the worlds with work, or -1. All threads of a warp must call it.
+/// Returns the world at index `turn` among the worlds with work, or -1 if there are fewer. All threads of a warp must
+/// call this function.
 template <typename Phase>
 __device__ int32_t world_with_work(const Phase& phase, int32_t count, int turn) {
   for (int32_t first = 0; first < count; first += kWarp) {
@@ -188,7 +189,7 @@ __device__ int32_t world_with_work(const Phase& phase, int32_t count, int turn) 
   return -1;
 }
 
-/// Blocks take the worlds with work in turn, so that no block has two while another has none.
+/// Kernel of teams. Blocks take the worlds with work in turn, so that no block has two while another has none.
 template <typename Phase>
 __global__ void __launch_bounds__(kTeamThreads) run_teams(int32_t count, Phase phase) {
   __shared__ TeamMemory memory;

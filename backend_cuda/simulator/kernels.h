@@ -15,8 +15,8 @@ struct StepStreams {
   bool may_begin_early = false;  // see may_begin_early()
 };
 
-/// Whether kernels of thread groups for the current device call wait_for_earlier_launch(): from compute capability 9.0
-/// on.
+/// Whether kernels of thread groups may begin while the previous kernel ends. They may if their code for the current
+/// device was compiled for compute capability 9.0 or later, because it then calls wait_for_earlier_launch().
 bool may_begin_early();
 
 /// mask: [worlds]; null: all worlds.

@@ -281,6 +281,7 @@ PICTURA_HD inline uint32_t list_index(NearPlace place, EntitySet set) {
   return set == EntitySet::controls ? place.cell() : place.cell_and_sector;
 }
 
+/// Returns the pieces or stop lines of a set that are near a place.
 PICTURA_HD inline Span<const int32_t> items_near(const MapView& map, NearPlace place, EntitySet set) {
   return list_of(lists_near(map, set), list_index(place, set));
 }
