@@ -6,7 +6,6 @@ evaluation.png (metrics of the released policies by density), camera_severity.pn
                                           must be importable.
 """
 
-import json
 import pathlib
 import sys
 
@@ -17,10 +16,10 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
+from released_policies import metrics_of
 
 import pictura
 
-ROOT = pathlib.Path(__file__).resolve().parents[1]
 BLUE, ORANGE, GREY = "#4361ee", "#fb8500", "#8d99ae"
 UPDATE = [
     ("Rollout", "one policy drives all agents\nof all worlds, each from\nits own observations"),
@@ -142,12 +141,10 @@ def draw_update(path):
 
 
 def draw_evaluation(path):
-    """Draws metrics of the released policies by density, with 95 % intervals, from bench/results/agent_29_november.json."""
-    results = json.loads((ROOT / "bench/results/agent_29_november.json").read_text())["policies"]
+    """Draws metrics of the released policies by density, with 95 % intervals."""
     figure, axes = plt.subplots(1, len(METRICS), figsize=(11, 2.9))
     for policy, color in POLICIES.items():
-        (of_policy,) = (rows for name, rows in results.items() if name.startswith(f"models/{policy}.safetensors"))
-        rows = [of_policy[density]["rows"][0] for density in DENSITIES]
+        rows = [metrics_of(policy, density) for density in DENSITIES]
         for panel, metric in zip(axes, METRICS, strict=True):
             values, half_widths = ([row[key] for row in rows] for key in (metric, f"{metric}_half_width_95"))
             panel.errorbar(list(DENSITIES.values()), values, half_widths, label=policy, color=color, marker="o", markersize=3, capsize=3)
