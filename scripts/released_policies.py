@@ -7,7 +7,7 @@ EVALUATIONS, DATE = ROOT / "bench/results/agent_29_november.json", "29 November 
 
 
 def metrics_of(policy, density):
-    """Returns the metrics of models/POLICY.safetensors at a density, with independent lights: the report's row."""
+    """Returns the metrics of models/POLICY.safetensors at a density with independent lights, a row of `pictura evaluate --json`."""
     policies = json.loads(EVALUATIONS.read_text())["policies"]
     (reports,) = (reports for name, reports in policies.items() if name.startswith(f"models/{policy}.safetensors"))
     return reports[density]["rows"][0]

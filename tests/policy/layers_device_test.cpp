@@ -127,8 +127,8 @@ TEST_P(DeviceLayers, ConvolveGelu) {
         if (has_norm) x = at::layer_norm(x, {x.size(-1)}).to(x.scalar_type());
         return gelu(x).permute({0, 3, 1, 2});
       };
-      // 64: fused with the norm; 32: ATen's own norm. In images of 7x10 no gradient is a small rest of large terms (in
-      // images of 9x12, that of 64 outputs' weight is).
+      // 64: fused with the norm; 32: ATen's own norm. Images of 9x12 would not do: with 64 outputs, the terms of the
+      // weight's gradient cancel to a hundredth there.
       for (const int64_t out : {32, 64}) {
         expect_as_on_the_host(layer, plain,
                               {numbers({5, 16, 7, 10}, 1), 0.1 * numbers({out, 12, 3, 3}, 2), numbers({out}, 3)}, 1);
