@@ -107,7 +107,7 @@ class ParameterReader {
     fail("{}: has a different architecture: no parameter '{}'", saved_.path, name);
   }
   /// Throws Error if the file has parameters that were not read.
-  void finish() const { check_parameter_count(saved_.path, saved_.parameters, taken_); }
+  void finish() const { check_parameter_count(saved_.path, saved_.parameters.size(), taken_); }
 
   static Numbers transposed(const Numbers& matrix, int64_t rows, int64_t columns) {
     Numbers result(matrix.size());

@@ -318,6 +318,7 @@ PolicyNetwork::PolicyNetwork(const PolicySection& config, int num_cameras, uint6
     scene_ = std::make_unique<PerspectiveEncoder>(config, num_cameras, input_type, &make);
   else
     scene_ = std::make_unique<VectorEncoder>(config, reads_walls, input_type, &make);
+  num_scene_parameters_ = std::ssize(parameters_);
   ego_features_ = num_ego_features(sees_images);
   ego_ = make.group("ego", ego_features_, config);
   conditioning_ = make.group(

@@ -54,6 +54,10 @@ class Policy {
   virtual Output forward(const Observation& observation) const = 0;
 
   const std::vector<NamedTensor>& parameters() const { return parameters_; }
+  /// Returns the parameters behind the scene encoder, whose names do not depend on policy.modality.
+  std::vector<NamedTensor> trunk_parameters() const {
+    return {parameters_.begin() + num_scene_parameters_, parameters_.end()};
+  }
   int64_t num_parameters() const;
   std::string hash() const;
   /// Hash of the program policy.backbone; empty without one.
@@ -65,6 +69,7 @@ class Policy {
 
  protected:
   std::vector<NamedTensor> parameters_;
+  ptrdiff_t num_scene_parameters_ = 0;  // the scene encoder's parameters come first
 };
 
 /// The paper's actor-critic network.

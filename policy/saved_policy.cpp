@@ -43,8 +43,8 @@ void write_policy(const std::string& path, const SavedPolicy& policy, WeightType
   write_stored_policy(path, {policy, to_stored(policy.parameters)}, type, commit);
 }
 
-void restore_tensors(const std::string& path, const std::vector<NamedTensor>& saved,
-                     const std::vector<NamedTensor>& parameters) {
+void copy_tensors(const std::string& path, const std::vector<NamedTensor>& saved,
+                  const std::vector<NamedTensor>& parameters) {
   const std::vector<StoredTensor> stored = to_stored(saved);
   check_finite(path, stored);
   const at::NoGradGuard no_grad;
@@ -53,7 +53,12 @@ void restore_tensors(const std::string& path, const std::vector<NamedTensor>& sa
     at::Tensor target = parameter.value;
     target.copy_(to_tensors({found}).front().value);
   }
-  check_parameter_count(path, stored, parameters.size());
+}
+
+void restore_tensors(const std::string& path, const std::vector<NamedTensor>& saved,
+                     const std::vector<NamedTensor>& parameters) {
+  copy_tensors(path, saved, parameters);
+  check_parameter_count(path, saved.size(), parameters.size());
 }
 
 void restore_policy(const SavedPolicy& saved, const Policy& policy) {

@@ -19,8 +19,11 @@ SavedPolicy read_policy(const std::string& path, bool average = false);
 SavedPolicy parse_policy(const std::string& file, const std::string& path, bool average = false);
 void write_policy(const std::string& path, const SavedPolicy& policy, WeightType type, const std::string& commit);
 
-/// Copies `saved` into `parameters` in place. Throws Error naming the file `path` and a tensor that is missing, not
-/// finite, or of another shape.
+/// Copies the saved tensors with the names of `parameters` into them in place. Throws Error naming the file `path` and
+/// the first tensor that is missing, not finite, or of another shape.
+void copy_tensors(const std::string& path, const std::vector<NamedTensor>& saved,
+                  const std::vector<NamedTensor>& parameters);
+/// Copies `saved` into `parameters`. Throws as copy_tensors() does, and Error if `saved` has further tensors.
 void restore_tensors(const std::string& path, const std::vector<NamedTensor>& saved,
                      const std::vector<NamedTensor>& parameters);
 

@@ -193,9 +193,9 @@ const StoredTensor& find_parameter(const std::string& path, const std::vector<St
   return *found;
 }
 
-void check_parameter_count(const std::string& path, const std::vector<StoredTensor>& saved, size_t expected) {
-  PICTURA_CHECK(saved.size() == expected, "{}: has a different architecture: expected {} parameters, got {}", path,
-                expected, saved.size());
+void check_parameter_count(const std::string& path, size_t saved, size_t expected) {
+  PICTURA_CHECK(saved == expected, "{}: has a different architecture: expected {} parameters, got {}", path, expected,
+                saved);
 }
 
 std::string hash_of_parameters(const std::vector<StoredTensor>& parameters) {

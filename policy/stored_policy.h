@@ -56,7 +56,7 @@ void check_finite(const std::string& path, const std::vector<StoredTensor>& save
 const StoredTensor& find_parameter(const std::string& path, const std::vector<StoredTensor>& saved,
                                    const std::string& name, const std::vector<int64_t>& shape);
 /// Throws Error naming the file if the number of parameters is not `expected`.
-void check_parameter_count(const std::string& path, const std::vector<StoredTensor>& saved, size_t expected);
+void check_parameter_count(const std::string& path, size_t saved, size_t expected);
 
 /// Returns 16 hexadecimal digits.
 std::string hash_of_parameters(const std::vector<StoredTensor>& parameters);

@@ -188,9 +188,14 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   if (!(options.minutes >= 0 && std::isfinite(options.minutes))) {
     fail_usage("train: minutes: expected 0 (no limit) or more, got {}", options.minutes);
   }
+  if (!options.init_trunk_from.empty() && (!options.init_from.empty() || options.old_run == OldRun::resume)) {
+    fail_usage("train: init_trunk_from '{}': expected neither init_from nor resume", options.init_trunk_from);
+  }
   const Config config = load_config(options.config_path, options.overrides);
-  check_equal_settings(
-      config, fmt::format("old_run {}, init_from '{}'", static_cast<int>(options.old_run), options.init_from), ranks);
+  check_equal_settings(config,
+                       fmt::format("old_run {}, init_from '{}', init_trunk_from '{}'",
+                                   static_cast<int>(options.old_run), options.init_from, options.init_trunk_from),
+                       ranks);
   const Device device = open_learning_device(config, options.launch.local_rank);
   check_memory(config, device, available_bytes(device), ranks->size());
   check_map_memory(config, device, available_bytes(device), available_bytes(Device{}), ranks->size());

@@ -48,9 +48,10 @@ struct TrainOptions {
   std::vector<std::string> overrides;  // such as "train.updates=2"
   std::string out_folder;
   OldRun old_run = OldRun::refuse;
-  std::string init_from;  // checkpoint or safetensors, from which only weights are read
-  double minutes = 0;     // wall-time limit, start-up included; 0: none
-  std::string commit;     // commit of this program, for metadata
+  std::string init_from;        // checkpoint or safetensors, from which only weights are read
+  std::string init_trunk_from;  // file for Run::load_trunk(); excludes init_from and OldRun::resume
+  double minutes = 0;           // wall-time limit, start-up included; 0: none
+  std::string commit;           // commit of this program, for metadata
   Launch launch;
   std::function<void(const TrainProgress&)> on_progress;  // called only by rank 0, like on_notice
   std::function<void(const std::string&)> on_notice;      // for messages that are not errors

@@ -1,6 +1,6 @@
 #include "pictura/training/run.h"
 
-#include <tuple>
+#include <ATen/core/grad_mode.h>
 
 #include "pictura/backends/make_learner.h"
 #include "pictura/backends/make_renderer.h"
@@ -10,6 +10,7 @@
 #include "pictura/configuration/apply_config.h"
 #include "pictura/configuration/compare_configs.h"
 #include "pictura/map/load_map.h"
+#include "pictura/policy/network_shape.h"
 #include "pictura/simulator/saved_worlds.h"
 #include "pictura/training/patch_growth.h"
 #include "pictura/training/ranks/agree.h"
@@ -68,6 +69,17 @@ std::unique_ptr<Renderer> make_training_renderer(const Config& config, const Rig
 bool uses_graphs(const Config& config, Device device, const Renderer* renderer) {
   return config.train.graphs == "auto" && !device.is_host() && (!renderer || renderer->name() == "cuda") &&
          config.policy.backbone == "conv";
+}
+
+// Throws Error if settings of two networks differ. Some of them change no parameters, and an error about shapes would
+// not name the setting.
+void check_network_settings(const SavedPolicy& other, const Config& config,
+                            std::initializer_list<std::pair<const char*, bool PolicySection::*>> settings) {
+  for (const auto& [key, setting] : settings) {
+    const bool got = other.config.policy.*setting, expected = config.policy.*setting;
+    PICTURA_CHECK(got == expected, "{}: has a different architecture: {}: expected {}, got {}", other.path, key,
+                  expected, got);
+  }
 }
 
 }  // namespace
@@ -231,18 +243,30 @@ void Run::load_policy(const SavedPolicy& other) {
       !config.reads_images() || !other.config.reads_images() || other.rig.cameras.size() == rig.cameras.size(),
       "{}: its policy uses {} cameras, expected {}, as in {}", other.path, other.rig.cameras.size(), rig.cameras.size(),
       config.render.rig.empty() ? "the paper's rig" : config.render.rig);
-  // These settings are checked here, because some of them change no parameters, and an error about shapes would not
-  // name the setting.
-  for (const auto& [key, got, expected] :
-       {std::tuple{"policy.segment_features", other.config.policy.segment_features, config.policy.segment_features},
-        std::tuple{"policy.layer_norm", other.config.policy.layer_norm, config.policy.layer_norm},
-        std::tuple{"policy.conv_norm", other.config.policy.conv_norm, config.policy.conv_norm},
-        std::tuple{"policy.residual", other.config.policy.residual, config.policy.residual}}) {
-    PICTURA_CHECK(got == expected, "{}: has a different architecture: {}: expected {}, got {}", other.path, key,
-                  expected, got);
-  }
+  check_network_settings(other, config,
+                         {{"policy.segment_features", &PolicySection::segment_features},
+                          {"policy.layer_norm", &PolicySection::layer_norm},
+                          {"policy.conv_norm", &PolicySection::conv_norm},
+                          {"policy.residual", &PolicySection::residual}});
   restore_policy(other, *policy);
   restore_rate_factors(other);
+  if (average) average->restart();
+}
+
+void Run::load_trunk(const SavedPolicy& other) {
+  check_network_settings(
+      other, config,
+      {{"policy.layer_norm", &PolicySection::layer_norm}, {"policy.residual", &PolicySection::residual}});
+  const at::NoGradGuard no_grad;
+  // The last ego features are auxiliary, and 0 for a policy that was trained without them.
+  const int64_t ego_features = num_ego_features(config.reads_images() || other.config.reads_images());
+  std::vector<NamedTensor> from = other.parameters, to = policy->trunk_parameters();
+  for (std::vector<NamedTensor>* tensors : {&from, &to}) {
+    for (NamedTensor& tensor : *tensors) {
+      if (tensor.name == "ego.hidden.weight") tensor.value = tensor.value.narrow(1, 0, ego_features);
+    }
+  }
+  copy_tensors(other.path, from, to);
   if (average) average->restart();
 }
 

@@ -26,6 +26,9 @@ struct Run {
 
   /// Copies another run's weights. Throws Error naming the difference if the networks differ.
   void load_policy(const SavedPolicy& other);
+  /// Copies the weights behind the scene encoder from a policy of any modality. If one of both reads images, auxiliary
+  /// ego features are not copied. Throws Error naming file and the first parameter whose shape differs.
+  void load_trunk(const SavedPolicy& other);
   SavedPolicy saved_policy() const;
   /// Policy with averaged weights, if the run averages them.
   SavedPolicy averaged_policy() const;

@@ -44,9 +44,9 @@ std::vector<RecentUpdate> RunKeeper::begin(Run* run) {
     recent = saved.recent;
     saved_update_ = run->update;
   } else {
-    if (!options_.init_from.empty()) {
-      run->load_policy(parse_policy(file_of_first(options_.init_from, communicator_), options_.init_from));
-    }
+    const auto saved = [&](const std::string& file) { return parse_policy(file_of_first(file, communicator_), file); };
+    if (!options_.init_from.empty()) run->load_policy(saved(options_.init_from));
+    if (!options_.init_trunk_from.empty()) run->load_trunk(saved(options_.init_trunk_from));
     if (!old_files_.empty()) {
       folder_ = path(".pictura-new-run");
       fs::remove_all(folder_);  // left by a run that ended before its first checkpoint

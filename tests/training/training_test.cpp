@@ -712,6 +712,72 @@ TEST_F(Training, StartsWithWeightsOfAnotherRunAtAnyImageSize) {
               AllOf(HasSubstr(first), HasSubstr("policy.segment_features: expected true, got false")));
 }
 
+TEST_F(Training, StartsWithTheTrunkOfAnotherModality) {
+  const auto is_of_trunk = [](const std::string& name) {
+    return std::ranges::any_of(std::array{"ego.", "conditioning.", "backbone.", "actor.", "critic."},
+                               [&](const char* begin) { return name.starts_with(begin); });
+  };
+  const auto untrained = [&](const TrainOptions& o) {
+    train(o);
+    return read_checkpoint(o.out_folder + "/untrained.ckpt").parameters;
+  };
+  for (const auto& [own, others] : {std::pair{"perspective", "vector"}, {"vector", "perspective"}}) {
+    SCOPED_TRACE(own);
+    const std::string other = train(options(others + std::string(" other"), {"train.updates=1", "run.seed=5",
+                                                                             std::string("policy.modality=") + others}))
+                                  .checkpoint;
+    TrainOptions o = options(own + std::string(" plain"), {"train.updates=1", std::string("policy.modality=") + own});
+    const std::vector<NamedTensor> plain = untrained(o), from = read_checkpoint(other).parameters;
+    o.out_folder = folder_ / (own + std::string(" begun"));
+    o.init_trunk_from = other;
+    size_t of_trunk = 0;
+    const std::vector<NamedTensor> begun = untrained(o);
+    for (size_t i = 0; i < begun.size(); ++i) {
+      const auto& [name, value] = begun[i];
+      if (!is_of_trunk(name)) {
+        EXPECT_TRUE(value.equal(plain[i].value)) << name;
+        continue;
+      }
+      ++of_trunk;
+      at::Tensor expected = plain[i].value.clone();
+      const auto its = std::ranges::find(from, name, &NamedTensor::name);
+      ASSERT_NE(its, from.end()) << name;
+      if (name == "ego.hidden.weight") {
+        expected.narrow(1, 0, kEgoFeatures - 2).copy_(its->value.narrow(1, 0, kEgoFeatures - 2));
+      } else {
+        expected.copy_(its->value);
+      }
+      EXPECT_TRUE(value.equal(expected)) << name;
+    }
+    EXPECT_EQ(of_trunk, 4u + 4 + 2 * 2 + 4);
+    EXPECT_LT(of_trunk, begun.size());
+  }
+}
+
+TEST_F(Training, ErrorsNameTrunksThatDoNotFit) {
+  const std::string vector = train(options("vector", {"train.updates=1", "policy.modality=vector"})).checkpoint;
+  const auto message = [&](const std::vector<std::string>& settings, const std::string& init_from = "",
+                           OldRun old_run = OldRun::refuse) {
+    TrainOptions o = options("run", settings);
+    o.init_trunk_from = vector;
+    o.init_from = init_from;
+    o.old_run = old_run;
+    return message_of([&] { train(o); });
+  };
+  EXPECT_THAT(
+      message({"policy.backbone_width=64"}),
+      HasSubstr(vector + ": has a different architecture: parameter 'backbone.0.weight': expected [64, 384], got "
+                         "[128, 384]"));
+  EXPECT_THAT(message({"policy.embedding_width=32"}),
+              AllOf(HasSubstr(vector), HasSubstr("parameter 'ego.hidden.weight'")));
+  EXPECT_THAT(message({"policy.backbone_layers=3"}),
+              AllOf(HasSubstr(vector), HasSubstr("no parameter 'backbone.2.weight'")));
+  EXPECT_THAT(message({"policy.residual=true"}),
+              AllOf(HasSubstr(vector), HasSubstr("policy.residual: expected true, got false")));
+  EXPECT_THAT(message({}, vector), AllOf(HasSubstr("init_trunk_from"), HasSubstr("neither init_from nor resume")));
+  EXPECT_THAT(message({}, "", OldRun::resume), HasSubstr("neither init_from nor resume"));
+}
+
 TEST_F(Training, StopsOnNonFiniteLogits) {
   // Logits exceed all floats after an update.
   const TrainOptions o = options("run", {"train.updates=4", "train.sharpen_agent_steps=1"});
