@@ -349,14 +349,14 @@ Policy::Output PolicyNetwork::forward(const Observation& o) const {
                                o.waypoints.scalar_type())
                       .flatten(1));
   }
-  at::Tensor x;
+  at::Tensor scene, x;
   {
     const LayerPrecision precision(precision_, o.ego.device().type());
-    x = run_trunk(at::cat(
-        {scene_->forward(o), encode(ego_, o.ego.narrow(1, 0, ego_features_)), encode(conditioning_, at::cat(own, 1))},
-        1));
+    scene = scene_->forward(o);
+    x = run_trunk(
+        at::cat({scene, encode(ego_, o.ego.narrow(1, 0, ego_features_)), encode(conditioning_, at::cat(own, 1))}, 1));
   }
-  return {apply(actor_, x.to(type_)), apply(critic_, x.to(type_)).squeeze(1)};
+  return {apply(actor_, x.to(type_)), apply(critic_, x.to(type_)).squeeze(1), scene};
 }
 
 int64_t Policy::num_parameters() const {
@@ -406,14 +406,17 @@ std::unique_ptr<const Policy> make_policy(const Config& config, const Rig& rig, 
 at::Tensor Decision::are_finite() const { return logits.isfinite().all().logical_and(value.isfinite().all()); }
 
 Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
-                const std::function<Policy::Output(const at::Tensor& rows)>& act) {
+                const std::function<Policy::Output(const at::Tensor& rows)>& act, int64_t scene_width) {
   const at::NoGradGuard no_grad;
   const at::TensorOptions options = rows.options().dtype(at::kFloat);
   Decision decision{at::empty({rows.size(0), kNumActions}, options), {}, at::empty({rows.size(0)}, options)};
+  if (scene_width > 0) decision.scene = at::empty({rows.size(0), scene_width}, options);
   for_each_chunk(rows, chunks, [&](const Chunk& chunk) {
     const Policy::Output output = act(chunk.rows);
     decision.logits.narrow(0, chunk.begin, chunk.count).copy_(output.logits.narrow(0, 0, chunk.count));
     decision.value.narrow(0, chunk.begin, chunk.count).copy_(output.value.narrow(0, 0, chunk.count));
+    if (scene_width > 0)
+      decision.scene.narrow(0, chunk.begin, chunk.count).copy_(output.scene.narrow(0, 0, chunk.count));
   });
   decision.log_probs = at::log_softmax(decision.logits, 1);
   return decision;

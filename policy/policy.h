@@ -50,6 +50,7 @@ class Policy {
   struct Output {
     at::Tensor logits;  // [batch, kNumActions]
     at::Tensor value;   // [batch], in units of the reward
+    at::Tensor scene;   // [batch, scene_width()], output of the scene encoder in the type of its computation
   };
   virtual Output forward(const Observation& observation) const = 0;
 
@@ -58,6 +59,8 @@ class Policy {
   std::vector<NamedTensor> trunk_parameters() const {
     return {parameters_.begin() + num_scene_parameters_, parameters_.end()};
   }
+  /// 0: the policy has no scene encoder, and Output::scene is undefined.
+  virtual int64_t scene_width() const { return 0; }
   int64_t num_parameters() const;
   std::string hash() const;
   /// Hash of the program policy.backbone; empty without one.
@@ -82,6 +85,7 @@ class PolicyNetwork final : public Policy {
                 bool reads_walls = false, Device device = {}, Precision precision = Precision::fp32);
 
   Output forward(const Observation& observation) const override;
+  int64_t scene_width() const override { return scene_->width(); }
   std::string backbone_hash() const override;
   void check_images(const Rig& rig) const override;
   int drawn_patch_px() const override;
@@ -122,6 +126,7 @@ void scale_logits(const Policy& policy, double factor);
 /// Outputs for a batch, without gradients: logits and log-probabilities [batch, actions], values [batch].
 struct Decision {
   at::Tensor logits, log_probs, value;
+  at::Tensor scene;  // f32 [batch, scene_width]; undefined unless requested
 
   /// Whether all logits and values are finite, as a bool tensor.
   at::Tensor are_finite() const;
@@ -129,9 +134,9 @@ struct Decision {
   bool is_finite() const { return are_finite().item<bool>(); }
 };
 /// Runs the policy chunk by chunk for `rows`, i64 [batch]. act(rows) returns the output for a chunk's rows, valid until
-/// its next call.
+/// its next call. A scene_width other than 0, the policy's, requests scene embeddings.
 Decision decide(const at::Tensor& rows, const ChunkSizes& chunks,
-                const std::function<Policy::Output(const at::Tensor& rows)>& act);
+                const std::function<Policy::Output(const at::Tensor& rows)>& act, int64_t scene_width = 0);
 
 /// Returns each channel's largest value in a set: [batch, members, width] -> [batch, width]; 0 for an empty set.
 /// Members from index counts[i] on are padding; counts: [batch].
