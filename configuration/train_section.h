@@ -50,6 +50,8 @@ struct TrainSection {
   std::string teacher;
   double teacher_coef = 1;
   int64_t teacher_agent_steps = 100'000'000;
+  /// Constant weight of the distance between the learner's and the teacher's scene embeddings (Policy::Output::scene).
+  double teacher_scene_coef = 0;
   bool norm_adv = true;  // per minibatch
   FilterThreshold adv_filter = FilterThreshold::maximum;
   double adv_filter_threshold = 0.01;  // for maximum: fraction of the running maximum of |advantage|; 0: keeps all

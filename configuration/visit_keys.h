@@ -125,6 +125,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.value(NamedKey{"train.teacher", Resume::reported}, c.train.teacher);
   v.value(NamedKey{"train.teacher_coef", Resume::reported}, c.train.teacher_coef, 0, 1e6);
   v.value(NamedKey{"train.teacher_agent_steps", Resume::reported}, c.train.teacher_agent_steps, 1, int64_t{1} << 60);
+  v.value(NamedKey{"train.teacher_scene_coef", Resume::reported}, c.train.teacher_scene_coef, 0, 1e6);
   v.value("train.norm_adv", c.train.norm_adv);
   v.choice("train.adv_filter", c.train.adv_filter, kFilterThresholds);
   v.value("train.adv_filter_threshold", c.train.adv_filter_threshold, 0, 1);

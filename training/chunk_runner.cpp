@@ -75,13 +75,18 @@ Policy::Output ChunkRunner::forward_no_grad(const at::Tensor& rows) {
 }
 
 void ChunkRunner::set_targets(const Targets& targets) {
+  const auto address = [](const at::Tensor& t) { return t.defined() ? t.const_data_ptr() : nullptr; };
   // Losses with a teacher need other graphs than losses without one.
-  if (targets.teacher_log_probs.defined() != targets_.teacher_log_probs.defined()) clear();
+  if (targets.teacher_log_probs.defined() != targets_.teacher_log_probs.defined() ||
+      address(targets.teacher_scene) != address(targets_.teacher_scene)) {
+    clear();
+  }
   set(&targets_.actions, targets.actions);
   set(&targets_.old_log_probs, targets.old_log_probs);
   set(&targets_.returns, targets.returns);
   set(&targets_.teacher_log_probs, targets.teacher_log_probs);
   set(&targets_.teacher_weight, targets.teacher_weight);
+  targets_.teacher_scene = targets.teacher_scene;  // a copy at a fixed address would double its memory
 }
 
 at::Tensor ChunkRunner::add_gradients(const Minibatch& minibatch, int64_t forward_chunk, const LossFunction& loss) {
@@ -93,6 +98,7 @@ at::Tensor ChunkRunner::add_gradients(const Minibatch& minibatch, int64_t forwar
     // A product with 1 changes no bit, so one graph serves full and padded chunks.
     set(&work.chunk.shares,
         chunk.shares.defined() || !graphs_->are_used() ? chunk.shares : at::ones_like(chunk.advantages));
+    set(&work.chunk.scene_scale, chunk.scene_scale);
     if (!work.weight.defined()) work.weight = at::empty({}, stats_.options());
     work.weight.fill_(static_cast<double>(of_rows.count) / static_cast<double>(minibatch.global_size));
 

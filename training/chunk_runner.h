@@ -19,6 +19,7 @@ struct Targets {
   at::Tensor returns;            // in units of rewards
   at::Tensor teacher_log_probs;  // [steps * slots, kNumActions]; undefined without a teacher
   at::Tensor teacher_weight;     // scalar, weight of the teacher's KL divergence; undefined without a teacher
+  at::Tensor teacher_scene;      // [steps * slots, width], the teacher's scene embeddings; undefined without them
 };
 
 /// Losses of a chunk: means over rows, with gradients.
@@ -45,6 +46,7 @@ class ChunkRunner {
   /// Like act(), but runs the network without CUDA graphs. Counts as Phase::learn.
   Policy::Output forward_no_grad(const at::Tensor& rows);
 
+  /// `teacher_scene` must remain at its address while it is used. Another address discards all graphs.
   void set_targets(const Targets& targets);
   /// Adds the loss gradient of this rank's part of a minibatch to the parameters' gradients, which must be defined.
   /// Computes chunks of at most forward_chunk rows. Returns the part's statistics, f64 [kNumLossStats], valid until the

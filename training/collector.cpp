@@ -63,7 +63,7 @@ bool Collector::collect_on_stream() {
     const at::Tensor slots = record(step);
     const Decision decision = decide(&run_, step, slots);
     are_finite.logical_and_(decision.are_finite());
-    record_teacher_log_probs(step, slots);
+    record_teacher(step, slots);
     repeat_held_actions(step, slots);
     run_.executor->choose_actions(simulator.arrays(), span_of<const int64_t>(slots),
                                   span_of<const float>(decision.log_probs),
@@ -107,11 +107,15 @@ void Collector::repeat_held_actions(int64_t step, const at::Tensor& deciding) {
   if (step > 0) rollout.actions.select(0, step).copy_(rollout.actions.select(0, step - 1));
 }
 
-void Collector::record_teacher_log_probs(int64_t step, const at::Tensor& slots) {
-  if (teacher_weight_at(run_.config.train, run_.agent_steps) == 0) return;
+void Collector::record_teacher(int64_t step, const at::Tensor& slots) {
+  Rollout& rollout = run_.rollout;
+  const bool with_actions = teacher_weight_at(run_.config.train, run_.agent_steps) > 0,
+             with_scene = rollout.teacher_scene.defined();
+  if (!with_actions && !with_scene) return;
   const PhaseTimer::Scope timed(&run_.timer, Phase::forward);
-  run_.rollout.teacher_log_probs.select(0, step).index_copy_(0, slots,
-                                                             run_.teacher->log_probs(run_.simulator->arrays(), slots));
+  const Decision decision = run_.teacher->decide(run_.simulator->arrays(), slots, with_scene);
+  if (with_actions) rollout.teacher_log_probs.select(0, step).index_copy_(0, slots, decision.log_probs);
+  if (with_scene) rollout.teacher_scene.select(0, step).index_copy_(0, slots, decision.scene);
 }
 
 void Collector::simulate(int64_t step) {

@@ -27,8 +27,8 @@ class Collector {
   at::Tensor record(int64_t step);
   // Repeats the previous actions of the other agents.
   void repeat_held_actions(int64_t step, const at::Tensor& deciding);
-  // Does nothing if the teacher's weight is 0.
-  void record_teacher_log_probs(int64_t step, const at::Tensor& slots);
+  // Records what the losses use of the teacher's decisions. Does not run the teacher if its weights are 0.
+  void record_teacher(int64_t step, const at::Tensor& slots);
   void simulate(int64_t step);
 
   Run& run_;

@@ -9,7 +9,7 @@ namespace pictura {
 template <typename Number>
 struct LossStatsOf {
   Number policy_loss{}, value_loss{};
-  Number teacher_kl{};  // not multiplied by its weight
+  Number teacher_kl{}, scene{};  // not multiplied by their weights
   Number entropy{}, approx_kl{}, clip_fraction{}, abs_log_ratio{};
   Number grad_norm{};  // before clipping
 
@@ -27,6 +27,7 @@ struct LossStatsOf {
     f("policy_loss", stats.policy_loss);
     f("value_loss", stats.value_loss);
     f("teacher_kl", stats.teacher_kl);
+    f("scene", stats.scene);
     visit_actions(stats, f);
   }
   template <typename Stats, typename F>

@@ -49,6 +49,11 @@ constexpr double kTransitionBytes = 5 * 4 + 3 + 4 + 6 * 8;
 // Bytes of a map per byte of its file. Both exceed the measured values of CARLA's towns, procedural towns, and copies.
 constexpr double kHostBytesPerFileByte = 17, kDeviceBytesPerFileByte = 11;
 
+// Returns the width of the scene encoder's output.
+double scene_width(const Config& config) {
+  return (config.reads(ObservationPart::walls) ? 5.0 : 4.0) * config.policy.embedding_width;
+}
+
 double kept_image_bytes(const Config& config, double agents) {
   return agents * image_bytes(config) * double(num_kept_images(config.train.num_steps, config.policy.decision_steps));
 }
@@ -68,7 +73,10 @@ double estimated_bytes(const Config& config, bool keeps_images) {
   // Observations of steps + 2 steps: one step in the simulator, and steps + 1 in the rollout.
   double bytes =
       boxes * kSimulatorBytesPerBox + agents * (observation_bytes(config) * (steps + 2) + kTransitionBytes * steps);
-  if (!config.train.teacher.empty()) bytes += agents * steps * kNumActions * sizeof(float);
+  if (!config.train.teacher.empty()) {
+    const double scene = config.train.teacher_scene_coef > 0 ? scene_width(config) : 0;
+    bytes += agents * steps * (kNumActions + scene) * sizeof(float);
+  }
   if (!config.reads_images()) return bytes;
   if (keeps_images) return bytes + kept_image_bytes(config, agents);
   const SceneHistorySize scenes{static_cast<int>(steps) + 1, static_cast<size_t>(worlds), static_cast<size_t>(boxes), 0,
@@ -164,18 +172,12 @@ void add_images(const Config& config, const Rig& rig, LayerSum* sum) {
 LayerSum layers_of(const Config& config, const Rig& rig, Device device) {
   const PolicySection& policy = config.policy;
   LayerSum sum;
-  double sets = 4;
-  if (config.reads_images()) {
-    add_images(config, rig, &sum);
-  } else {
-    add_entity_sets(config, device, &sum);
-    sets = config.reads(ObservationPart::walls) ? 5 : 4;
-  }
+  config.reads_images() ? add_images(config, rig, &sum) : add_entity_sets(config, device, &sum);
   const double width = policy.embedding_width,
                waypoint = kWaypointFeatures + row_features_of(policy, "waypoints").count();
   sum.add_group(1, num_ego_features(config.reads_images()), width, policy.layer_norm);
   sum.add_group(1, kNumConditioning + kNumWaypoints * waypoint, width, policy.layer_norm);
-  const double in = (sets + 2) * width, inside = policy.backbone_width;
+  const double in = scene_width(config) + 2 * width, inside = policy.backbone_width;
   sum.add_values(in, 1);
   for (int i = 0; i < policy.backbone_layers; ++i) {
     sum.add(1, i == 0 ? in : inside, inside, policy.layer_norm ? 3 : 2);

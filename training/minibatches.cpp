@@ -11,7 +11,8 @@ constexpr int64_t kOfAnotherRank = -1;
 }  // namespace
 
 Minibatch Minibatch::part(const Chunk& chunk) const {
-  Minibatch result{chunk.rows, global_size, chunk.take(advantages), shares.defined() ? chunk.take(shares) : shares};
+  Minibatch result{chunk.rows, global_size, chunk.take(advantages), shares.defined() ? chunk.take(shares) : shares,
+                   scene_scale};
   if (chunk.count == chunk.size()) return result;
   if (!shares.defined()) {
     result.shares = at::constant_pad_nd(at::ones({chunk.count}, advantages.options()), {0, chunk.size() - chunk.count});

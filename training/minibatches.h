@@ -13,6 +13,7 @@ struct Minibatch {
   int64_t global_size = 0;  // transitions over all ranks
   at::Tensor advantages;    // [n], normalised if train.norm_adv is set
   at::Tensor shares;        // [n], weights in means; undefined: all 1
+  at::Tensor scene_scale;   // scalar, see scene_scale_of() in ppo.h; undefined without scene embeddings of a teacher
 
   /// Returns a chunk of the minibatch. Padding rows have weight 0.
   Minibatch part(const Chunk& chunk) const;

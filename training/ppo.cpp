@@ -30,6 +30,16 @@ at::Tensor log_probs_of(const at::Tensor& all_log_probs, const Targets& targets,
 
 }  // namespace
 
+at::Tensor scene_scale_of(const at::Tensor& embeddings, const at::Tensor& weights, Communicator* communicator) {
+  const at::Tensor numbers = embeddings.to(at::kDouble), weighted = weights.unsqueeze(1) * numbers;
+  const at::Tensor sums = at::cat({at::stack({weights.sum(), (weighted * numbers).sum()}), weighted.sum(0)});
+  communicator->sum(sums);
+  const at::Tensor count = sums[0].clamp_min(1), square = sums[1] / count;
+  const at::Tensor variance = square - (sums.slice(0, 2) / count).square().sum();
+  // The variance of equal embeddings is a rounding error.
+  return variance.reciprocal().masked_fill(variance <= 1e-9 * square, 0).to(at::kFloat);
+}
+
 Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Minibatch& chunk,
                   const TrainSection& config) {
   const auto mean = [&chunk](const at::Tensor& values) {
@@ -50,11 +60,17 @@ Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Mi
     teacher_kl = mean((teacher.exp() * (teacher - all_log_probs)).sum(1));
     imitation = targets.teacher_weight * teacher_kl;
   }
+  at::Tensor scene = at::zeros({}, losses.entropy.options());
+  if (targets.teacher_scene.defined()) {
+    const at::Tensor errors = output.scene.to(at::kFloat) - targets.teacher_scene.index_select(0, chunk.rows);
+    scene = chunk.scene_scale * mean(errors.square().sum(1));
+  }
   {
     const at::NoGradGuard no_grad;
     losses.stats = stacked({.policy_loss = losses.policy,
                             .value_loss = losses.value,
                             .teacher_kl = teacher_kl,
+                            .scene = scene,
                             .entropy = losses.entropy,
                             // Schulman's estimator of the KL divergence: unbiased and never negative.
                             .approx_kl = mean(ratio - 1 - log_ratio),
@@ -63,6 +79,7 @@ Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Mi
   }
   losses.total = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
   if (imitation.defined()) losses.total = losses.total + imitation;
+  if (targets.teacher_scene.defined()) losses.total = losses.total + config.teacher_scene_coef * scene;
   return losses;
 }
 
@@ -93,7 +110,7 @@ class PpoUpdate {
       minibatches.shuffle(key_.seed, key_.update, epoch);
       for (int64_t m = 0; m < minibatches.count(); ++m) {
         Minibatch minibatch = minibatches[m];
-        normalize_advantages(&minibatch);
+        prepare(&minibatch);
         const bool is_first = stats_.minibatches == 0;
         if (is_first) diagnosis.measure(minibatch, minibatches, loss_, config_, learner_);
         at::Tensor minibatch_stats = add_gradients(minibatch);
@@ -120,6 +137,7 @@ class PpoUpdate {
     values_ = rollout_.values.narrow(0, 0, rollout_.num_steps()).flatten();
     valid_ = rollout_.decisions().flatten();
     targets_ = {rollout_.actions.flatten().to(at::kLong), rollout_.log_probs.flatten(), advantages_ + values_};
+    if (rollout_.teacher_scene.defined()) targets_.teacher_scene = rollout_.teacher_scene.flatten(0, 1);
     if (key_.teacher_weight <= 0) return;
     targets_.teacher_log_probs = rollout_.teacher_log_probs.flatten(0, 1);
     targets_.teacher_weight = at::full({}, key_.teacher_weight, advantages_.options());
@@ -186,8 +204,9 @@ class PpoUpdate {
     return true;
   }
 
-  // Sets a minibatch's advantages, normalised over all ranks' transitions, and the weights of its rows in means.
-  void normalize_advantages(Minibatch* minibatch) const {
+  // Sets a minibatch's advantages, normalised over all ranks' transitions, the weights of its rows in means, and the
+  // scale of its scene loss.
+  void prepare(Minibatch* minibatch) const {
     at::Tensor advantages = advantages_.index_select(0, minibatch->rows);
     const at::Tensor valid =
         takes_all() ? valid_.index_select(0, minibatch->rows).to(at::kDouble) : at::ones_like(advantages, at::kDouble);
@@ -201,6 +220,10 @@ class PpoUpdate {
     minibatch->advantages = advantages;
     if (takes_all()) {
       minibatch->shares = (valid * (static_cast<double>(minibatch->global_size) / count)).to(at::kFloat);
+    }
+    if (targets_.teacher_scene.defined()) {
+      minibatch->scene_scale =
+          scene_scale_of(targets_.teacher_scene.index_select(0, minibatch->rows), valid, learner_.communicator);
     }
   }
 

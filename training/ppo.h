@@ -62,6 +62,11 @@ class NotFinite : public Error {
   std::vector<NamedTensor> minibatch;
 };
 
+/// Returns 1 / variance of scene embeddings [n, width] with weights f64 [n], summed over dimensions, as an f32 scalar;
+/// 0 if all embeddings are equal. Mean squared errors times this scale are 1 - R^2. Collective: every rank passes its
+/// rows of a minibatch, and gets the same scale.
+at::Tensor scene_scale_of(const at::Tensor& embeddings, const at::Tensor& weights, Communicator* communicator);
+
 Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Minibatch& chunk,
                   const TrainSection& config);
 

@@ -65,6 +65,7 @@ struct Rollout {
   at::Tensor decides;                       // u8; 0: the last action is repeated; undefined if that never happens
   at::Tensor advantages;                    // f32, see rules/gae.h
   at::Tensor teacher_log_probs;             // f32 [num_steps, num_slots, kNumActions]; undefined without a teacher
+  at::Tensor teacher_scene;                 // f32 [num_steps, num_slots, width]; undefined if teacher_scene_coef is 0
 
   Rollout(RolloutObservations its_observations, int64_t num_steps, int64_t num_slots, Device device);
   int64_t num_steps() const { return actions.size(0); }

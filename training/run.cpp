@@ -115,6 +115,14 @@ Run::Run(const Config& its_config, Device its_device, Communicator* its_communic
     rollout.teacher_log_probs =
         at::zeros({rollout.num_steps(), rollout.num_slots(), kNumActions}, rollout.log_probs.options());
   }
+  if (teacher && config.train.teacher_scene_coef > 0) {
+    const int64_t width = teacher->scene_width(), expected = policy->scene_width();
+    PICTURA_CHECK(width == expected,
+                  "{}: train.teacher_scene_coef: the teacher's scene embeddings have {} numbers (see "
+                  "policy.embedding_width), expected {}, as in the learner",
+                  config.train.teacher, width, expected);
+    rollout.teacher_scene = at::zeros({rollout.num_steps(), rollout.num_slots(), width}, rollout.log_probs.options());
+  }
   if (opponents) opponents->enter(*simulator);
   if (config.policy.decision_steps > 1) rollout.decides = at::ones_like(rollout.valid);
   for (const auto& change : config.render.schedule) policy->check_images(rig_of(config, change.agent_steps));

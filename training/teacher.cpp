@@ -42,18 +42,17 @@ void Teacher::enter(const Simulator& simulator) {
   upload_maps(simulator, renderer_.get());
 }
 
-at::Tensor Teacher::log_probs(const SimulatorArrays& input, const at::Tensor& slots) const {
+Decision Teacher::decide(const SimulatorArrays& input, const at::Tensor& slots, bool with_scene) const {
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());
-  return decide(slots, chunks_,
-                [&](const at::Tensor& some) {
-                  Observation observation = select_arrays(config_, input.observations, input.device, num_slots, some);
-                  if (renderer_) {
-                    observation.images = draw_images(input.scene, SelectedViews(input.views, device_, some).views(),
-                                                     renderer_.get(), policy_->drawn_patch_px());
-                  }
-                  return policy_->forward(observation);
-                })
-      .log_probs;
+  const auto act = [&](const at::Tensor& some) {
+    Observation observation = select_arrays(config_, input.observations, input.device, num_slots, some);
+    if (renderer_) {
+      observation.images = draw_images(input.scene, SelectedViews(input.views, device_, some).views(), renderer_.get(),
+                                       policy_->drawn_patch_px());
+    }
+    return policy_->forward(observation);
+  };
+  return pictura::decide(slots, chunks_, act, with_scene ? scene_width() : 0);
 }
 
 }  // namespace pictura

@@ -20,9 +20,10 @@ class Teacher {
   /// Prepares to draw the simulator's maps. The teacher's cameras are those of its training, without randomization.
   void enter(const Simulator& simulator);
 
-  /// Returns log-probabilities of all actions for the agents of `slots`, i64 [n], from current observations: f32 [n,
-  /// kNumActions], without gradients. An image teacher draws its own images; call enter() before.
-  at::Tensor log_probs(const SimulatorArrays& input, const at::Tensor& slots) const;
+  /// Returns the teacher's decision for the agents of `slots`, i64 [n], from current observations. An image teacher
+  /// draws its own images; call enter() before.
+  Decision decide(const SimulatorArrays& input, const at::Tensor& slots, bool with_scene) const;
+  int64_t scene_width() const { return policy_->scene_width(); }
 
  private:
   const Config config_;  // the teacher's configuration

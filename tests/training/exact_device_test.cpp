@@ -47,7 +47,7 @@ TEST_F(DeviceExact, GraphsAndCallsDriveIdentically) {
 struct Learnt {
   std::vector<std::string> policies;           // hashes, after each update
   std::vector<double> losses;                  // all logged losses, after each update
-  std::vector<double> teacher_kl;              // after each update
+  std::vector<double> teacher_kl, scene;       // after each update
   std::vector<int64_t> collecting, improving;  // launches of graphs, in each update
   std::vector<int64_t> allocations;            // allocations of device memory, in each update
 };
@@ -85,6 +85,7 @@ Learnt learn(const std::vector<std::string>& more) {
       learnt.losses.push_back(loss);
     }
     learnt.teacher_kl.push_back(stats.all.teacher_kl);
+    learnt.scene.push_back(stats.all.scene);
     learnt.allocations.push_back(allocations() - allocated);
   }
   return learnt;
@@ -125,17 +126,23 @@ TEST_F(DeviceExact, GraphsAndCallsTrainIdenticallyWithAndAfterATeacher) {
   const std::string teacher = folder / "teacher.safetensors";
   const Config config = load_config(PICTURA_SOURCE_DIR "/configs/smoke.toml", {"policy.modality=vector", "run.seed=5"});
   write_policy(teacher, pictura::Run(config, Device{}).saved_policy(), WeightType::f32, "");
-  // Scheduled for 8,400 agent-steps per update.
-  const std::vector<std::string> more{"train.precision=bf16", "train.teacher=" + teacher,
-                                      "train.teacher_agent_steps=25000"};
-  std::vector<std::string> off = more;
-  off.push_back("train.graphs=off");
-  const Learnt calls = learn(off), graphs = learn(more);
-  EXPECT_EQ(graphs.policies, calls.policies);
-  EXPECT_EQ(graphs.losses, calls.losses);
-  EXPECT_GT(calls.teacher_kl.front(), 0);
-  EXPECT_EQ(calls.teacher_kl.back(), 0);
-  EXPECT_GT(graphs.improving.back(), 3 * 4);
+  for (const int scene_coef : {0, 1}) {
+    SCOPED_TRACE(scene_coef);
+    // Scheduled for 8,400 agent-steps per update.
+    const std::vector<std::string> more{"train.precision=bf16", "train.teacher=" + teacher,
+                                        "train.teacher_agent_steps=25000",
+                                        fmt::format("train.teacher_scene_coef={}", scene_coef)};
+    std::vector<std::string> off = more;
+    off.push_back("train.graphs=off");
+    const Learnt calls = learn(off), graphs = learn(more);
+    EXPECT_EQ(graphs.policies, calls.policies);
+    EXPECT_EQ(graphs.losses, calls.losses);
+    EXPECT_GT(calls.teacher_kl.front(), 0);
+    EXPECT_EQ(calls.teacher_kl.back(), 0);
+    EXPECT_EQ(calls.scene.front() > 0 && calls.scene.back() > 0, scene_coef > 0);
+    EXPECT_EQ(graphs.scene, calls.scene);
+    EXPECT_GT(graphs.improving.back(), 3 * 4);
+  }
 }
 
 TEST_P(DeviceGraphs, AllocateNothingAfterAllSizesWereCaptured) {

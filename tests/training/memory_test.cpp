@@ -67,6 +67,19 @@ TEST(Memory, ReplayedTracksOfScenesAreCounted) {
   EXPECT_GT(estimated_bytes(config, true), in_towns);
 }
 
+TEST(Memory, RecordedSceneEmbeddingsOfATeacherAreCounted) {
+  for (const std::string modality : {"vector", "perspective"}) {
+    Config config = config_of(modality, "kept", 240);
+    config.train.teacher_scene_coef = 1;
+    const double alone = estimated_bytes(config, true);
+    config.train.teacher = "teacher.safetensors";
+    const int64_t width = make_policy(config, rig_of(config), Device{})->scene_width();
+    EXPECT_EQ(estimated_bytes(config, true) - alone, 240.0 * 2 * (width + kNumActions) * 4);
+    config.train.teacher_scene_coef = 0;
+    EXPECT_EQ(estimated_bytes(config, true) - alone, 240.0 * 2 * kNumActions * 4);
+  }
+}
+
 TEST(Memory, ErrorsNameTheNumberOfAgentsThatFit) {
   const auto config = [](int num_slots) { return config_of("perspective", "kept", num_slots); };
   const Config any = config(250);

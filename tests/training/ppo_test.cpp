@@ -190,6 +190,7 @@ TEST(LossStats, ARowStoresEachNamedValue) {
   EXPECT_EQ(read, written);
   EXPECT_EQ(numbers.entropy, written.at("entropy"));
   EXPECT_EQ(numbers.teacher_kl, written.at("teacher_kl"));
+  EXPECT_EQ(numbers.scene, written.at("scene"));
   EXPECT_EQ(read.size(), static_cast<size_t>(kNumLossStats));
 }
 

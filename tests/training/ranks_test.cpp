@@ -261,6 +261,7 @@ Rollout part_of(const Rollout& whole, int64_t begin, int64_t end) {
                                   &Rollout::terminated, &Rollout::truncated, &Rollout::valid}) {
     result.*t = part(whole.*t);
   }
+  if (whole.teacher_scene.defined()) result.teacher_scene = part(whole.teacher_scene);
   return result;
 }
 
@@ -290,6 +291,10 @@ std::vector<Learnt> learn(const std::vector<int64_t>& ends, const TrainSection& 
       corridor.play(policy, update);
       // The last slots have no valid transitions in the second update: the last rank has nothing to learn from.
       if (update == 1) corridor.rollout.valid.narrow(1, 100, test::Corridor::kSlots - 100).fill_(0);
+      if (train.teacher_scene_coef > 0) {
+        const std::vector<int64_t> shape{test::Corridor::kSteps, test::Corridor::kSlots, policy.scene_width()};
+        corridor.rollout.teacher_scene = at::arange(c10::multiply_integers(shape), at::kFloat).sin().view(shape);
+      }
       Rollout own = part_of(corridor.rollout, rank == 0 ? 0 : ends[rank - 1], ends[rank]);
       ChunkRunner runner(policy, own.observations);
       learnt.last = ppo_update({&runner, corridor.executor.get(), &optimizer, &filter, nullptr, communicator.get()},
@@ -369,6 +374,18 @@ TEST(RankTraining, MatchesOneRankAndIsBitwiseIdenticalAmongRanks) {
       const double largest = one.steps[i].abs().max().item<double>();
       EXPECT_LE((ranks[0].steps[i] - one.steps[i]).abs().max().item<double>(), 1e-4 * largest + 1e-9) << i;
     }
+  }
+}
+
+TEST(RankTraining, ScalesTheSceneLossOverAllRanks) {
+  TrainSection train = plain_steps();
+  train.teacher_scene_coef = 1;
+  const Learnt one = learn({test::Corridor::kSlots}, train).front();
+  EXPECT_GT(one.last.all.scene, 0);
+  const std::vector<Learnt> ranks = learn({10, 100, test::Corridor::kSlots}, train);
+  for (const Learnt& rank : ranks) {
+    EXPECT_EQ(rank.hashes, ranks[0].hashes);
+    EXPECT_NEAR(rank.first.all.scene, one.first.all.scene, 1e-5 * one.first.all.scene);
   }
 }
 
