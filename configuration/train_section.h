@@ -36,7 +36,7 @@ struct TrainSection {
   int64_t forward_chunk = 2048;  // transitions per pass through the network
   double gamma = 0.999, gae_lambda = 0.95;
   double clip_coef = 0.2;
-  double vf_coef = 0.5, ent_coef = 0.01;
+  double policy_coef = 1, vf_coef = 0.5, ent_coef = 0.01;
   OptimizerKind optimizer = OptimizerKind::adamw;
   double learning_rate = 5e-4;
   double adam_beta1 = 0.9, adam_beta2 = 0.999, adam_eps = 1e-8, weight_decay = 0.01;

@@ -111,6 +111,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.value(NamedKey{"train.gamma", Resume::reported}, c.train.gamma, 0, 1);
   v.value(NamedKey{"train.gae_lambda", Resume::reported}, c.train.gae_lambda, 0, 1);
   v.value("train.clip_coef", c.train.clip_coef, 1e-6, 100);
+  v.value(NamedKey{"train.policy_coef", Resume::reported}, c.train.policy_coef, 0, 1e6);
   v.value("train.vf_coef", c.train.vf_coef, 0, 1e6);
   v.value(NamedKey{"train.ent_coef", Resume::reported}, c.train.ent_coef, 0, 1e6);
   v.choice(NamedKey{"train.optimizer", Resume::free}, c.train.optimizer, kOptimizers);

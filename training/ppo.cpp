@@ -77,7 +77,10 @@ Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Mi
                             .clip_fraction = mean(((ratio - 1).abs() > config.clip_coef).to(at::kFloat)),
                             .abs_log_ratio = mean(log_ratio.abs())});
   }
-  losses.total = losses.policy + config.vf_coef * losses.value - config.ent_coef * losses.entropy;
+  losses.total = config.vf_coef * losses.value;
+  // Without the policy loss, the policy may change so fast that its ratios overflow.
+  if (config.policy_coef > 0) losses.total = config.policy_coef * losses.policy + losses.total;
+  losses.total = losses.total - config.ent_coef * losses.entropy;
   if (imitation.defined()) losses.total = losses.total + imitation;
   if (targets.teacher_scene.defined()) losses.total = losses.total + config.teacher_scene_coef * scene;
   return losses;

@@ -43,6 +43,22 @@ TEST(Teacher, LossIsTheWeightedDivergenceFromItsActions) {
   EXPECT_LT((logits.grad() - 0.25 * (q - p) / 2).abs().max().item<double>(), 1e-12);
 }
 
+TEST(Teacher, ImitationAloneIgnoresRatios) {
+  const auto doubles = at::TensorOptions(at::kDouble);
+  const at::Tensor logits = at::tensor({0.3, -1.0, 2.0}, doubles).view({1, 3}).requires_grad_(true);
+  Targets targets{at::zeros({1}, at::kLong), at::full({1}, -1e4, doubles), at::zeros({1}, doubles)};
+  targets.teacher_log_probs = at::log_softmax(at::tensor({1.0, 0.0, 0.0}, doubles).view({1, 3}), 1);
+  targets.teacher_weight = at::ones({}, doubles);
+  const Minibatch minibatch{at::zeros({1}, at::kLong), 1, -at::ones({1}, doubles), /*shares=*/{}};
+  TrainSection train;
+  const auto loss = [&] { return ppo_losses({logits, at::zeros({1}, doubles)}, targets, minibatch, train).total; };
+  EXPECT_TRUE(std::isinf(loss().item<double>()));
+  train.policy_coef = train.ent_coef = 0;
+  loss().backward();
+  const at::Tensor expected = at::softmax(logits, 1) - targets.teacher_log_probs.exp();
+  EXPECT_LT((logits.grad() - expected).abs().max().item<double>(), 1e-12);
+}
+
 constexpr double kSceneCoef = 0.25;
 
 // Settings of which the scene loss is the only loss if advantages are 0.
