@@ -21,7 +21,8 @@ struct PolicySection {
   std::vector<int> conv_channels{64, 64, 128, 128, 128};
   std::vector<int> conv_kernels{1, 3, 3, 3, 3};
   std::vector<int> conv_strides{1, 1, 2, 1, 1};
-  int num_queries = 16;  // learned queries per camera
+  int num_queries = 16;              // learned queries per camera
+  bool concatenate_queries = false;  // false: the features of a camera are the mean over its queries
   int attention_heads = 4;
   int attention_mlp = 256;   // hidden width of the MLP; 0: no MLP
   int embedding_width = 64;  // per group of observations

@@ -86,6 +86,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.integers("policy.conv_kernels", c.policy.conv_kernels, 1, 31);
   v.integers("policy.conv_strides", c.policy.conv_strides, 1, 16);
   v.value("policy.num_queries", c.policy.num_queries, 1, 4096);
+  v.value("policy.concatenate_queries", c.policy.concatenate_queries);
   v.value("policy.attention_heads", c.policy.attention_heads, 1, 64);
   v.value("policy.attention_mlp", c.policy.attention_mlp, 0, 1 << 16);
   v.value("policy.embedding_width", c.policy.embedding_width, 1, 1 << 14);

@@ -225,11 +225,11 @@ class ImageEncoder {
       mlp_hidden_ = read->linear("attention.mlp_hidden", width_, config.attention_mlp);
       mlp_out_ = read->linear("attention.mlp_out", config.attention_mlp, width_);
     }
-    project_ = read->linear("project", num_cameras * width_, width());
+    project_ = read->linear("project", pooled_width(), width());
   }
 
   int64_t width() const { return 4 * int64_t{config_.embedding_width}; }
-  int64_t pooled_width() const { return num_cameras_ * width_; }
+  int64_t pooled_width() const { return num_cameras_ * camera_width(); }
 
   /// Returns the features of all images, [agents, pooled_width()], for encode().
   Numbers pool(const HostObservation& observation, int num_threads) {
@@ -244,7 +244,7 @@ class ImageEncoder {
       parallel_for(num_threads, observation.agents * cameras, [&](int64_t image, int thread) {
         const int camera = block.cameras[image % cameras];
         pool_image(block.pixels + image * of_image, block, sizes, where, camera, &scratch_[thread],
-                   pooled.data() + image / cameras * of_agent + camera * width_);
+                   pooled.data() + image / cameras * of_agent + camera * camera_width());
       });
     }
     return pooled;
@@ -367,16 +367,19 @@ class ImageEncoder {
     attended_.apply(sums, queries, pooled);
     const float* const its_queries = queries_.data() + camera * queries * width_;
     for (int64_t i = 0; i < queries * width_; ++i) pooled[i] += its_queries[i];
-    mean_of_rows(pooled, queries, width_, to);
-    if (config_.attention_mlp == 0) return;
-    mlp_norm_.apply(pooled, queries, width_);
-    float* const hidden = room(&scratch->hidden, queries * mlp_hidden_.out);
-    mlp_hidden_.apply_gelu(pooled, queries, hidden);
-    // The last layer is linear, so it is applied once to the mean over the queries.
-    Numbers mean(static_cast<size_t>(mlp_hidden_.out)), added(static_cast<size_t>(width_));
-    mean_of_rows(hidden, queries, mlp_hidden_.out, mean.data());
-    mlp_out_.apply(mean.data(), 1, added.data());
-    for (int64_t c = 0; c < width_; ++c) to[c] += added[c];
+    average_queries(pooled, width_, to);
+    if (config_.attention_mlp > 0) {
+      mlp_norm_.apply(pooled, queries, width_);
+      float* const hidden = room(&scratch->hidden, queries * mlp_hidden_.out);
+      mlp_hidden_.apply_gelu(pooled, queries, hidden);
+      // The last layer is linear, so it is applied to the mean over the queries.
+      Numbers mean(static_cast<size_t>(num_features() * mlp_hidden_.out)), added(static_cast<size_t>(camera_width()));
+      average_queries(hidden, mlp_hidden_.out, mean.data());
+      mlp_out_.apply(mean.data(), num_features(), added.data());
+      for (int64_t c = 0; c < camera_width(); ++c) to[c] += added[c];
+    }
+    // Concatenated features are the parts of a mean.
+    for (int64_t c = 0; c < camera_width(); ++c) to[c] /= static_cast<float>(num_features());
   }
 
   static void softmax_over_rows(float* scores, int64_t rows, int64_t columns) {
@@ -392,12 +395,20 @@ class ImageEncoder {
     }
   }
 
-  static void mean_of_rows(const float* x, int64_t rows, int64_t columns, float* to) {
-    std::fill_n(to, columns, 0.0f);
-    for (int64_t r = 0; r < rows; ++r) {
-      for (int64_t c = 0; c < columns; ++c) to[c] += x[r * columns + c];
+  // Number of features of one camera, each of width_.
+  int64_t num_features() const { return config_.concatenate_queries ? config_.num_queries : 1; }
+  int64_t camera_width() const { return num_features() * width_; }
+
+  // Averages the rows of the queries that form one feature, for each feature.
+  void average_queries(const float* x, int64_t columns, float* to) const {
+    const int64_t rows = config_.num_queries / num_features();
+    std::fill_n(to, num_features() * columns, 0.0f);
+    for (int64_t feature = 0; feature < num_features(); ++feature, to += columns) {
+      for (int64_t r = 0; r < rows; ++r, x += columns) {
+        for (int64_t c = 0; c < columns; ++c) to[c] += x[c];
+      }
+      for (int64_t c = 0; c < columns; ++c) to[c] /= static_cast<float>(rows);
     }
-    for (int64_t c = 0; c < columns; ++c) to[c] /= static_cast<float>(rows);
   }
 
   const PolicySection config_;

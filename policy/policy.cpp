@@ -152,8 +152,8 @@ class VectorEncoder final : public SceneEncoder {
 };
 
 /// Encodes images. Convolutions or a pretrained program, shared by all cameras, compute feature maps. For each camera,
-/// learned queries attend to the feature map, and their results are averaged. The results of all cameras are
-/// concatenated and projected to the width of the four sets that they replace.
+/// learned queries attend to the feature map, and their results are averaged or concatenated. The results of all
+/// cameras are concatenated and projected to the width of the four sets that they replace.
 class PerspectiveEncoder final : public SceneEncoder {
  public:
   /// Creates the encoder. Images are converted to `image_type`.
@@ -185,7 +185,8 @@ class PerspectiveEncoder final : public SceneEncoder {
       mlp_hidden_ = make->linear("attention.mlp_hidden", width_, config.attention_mlp, std::numbers::sqrt2);
       mlp_out_ = make->linear("attention.mlp_out", config.attention_mlp, width_, 1.0);
     }
-    project_ = make->linear("project", num_cameras * width_, width(), 1.0);
+    project_ =
+        make->linear("project", num_cameras * num_features() * width_, width(), std::sqrt(double(num_features())));
   }
 
   int64_t width() const override { return 4 * int64_t{config_.embedding_width}; }
@@ -254,8 +255,12 @@ class PerspectiveEncoder final : public SceneEncoder {
     return x;
   }
 
-  // Returns the features of a block's cameras, [cameras, batch, width]. The mean over queries is computed before the
-  // MLP's last layer, which is linear, so that this layer processes one row instead of num_queries rows.
+  // Number of features of one camera, each of width_.
+  int64_t num_features() const { return config_.concatenate_queries ? config_.num_queries : 1; }
+
+  // Returns the features of a block's cameras, [cameras, batch, num_features() * width]. A mean over queries is
+  // computed before the MLP's last layer, which is linear, so that this layer processes one row instead of num_queries
+  // rows.
   at::Tensor pool(const ImageBlock& block) const {
     const int64_t batch = block.pixels.size(0), cameras = block.pixels.size(1);
     const at::Tensor x = backbone_ ? backbone_->forward(block.pixels) : convolve(block.pixels);
@@ -267,9 +272,17 @@ class PerspectiveEncoder final : public SceneEncoder {
     const at::Tensor queries = at::stack(of_cameras);
     at::Tensor pooled = attend(queries, tokens).unflatten(0, {cameras, batch});
     pooled = pooled + queries.unsqueeze(1).to(pooled.scalar_type());
-    if (config_.attention_mlp == 0) return pooled.mean(2);
-    const at::Tensor hidden = apply_gelu(mlp_hidden_, apply_norm(mlp_norm_, pooled, {}));
-    return pooled.mean(2) + apply(mlp_out_, hidden.mean(2));
+    const auto averaged = [&](const at::Tensor& t) {
+      return config_.concatenate_queries ? t : t.mean(2, /*keepdim=*/true);
+    };
+    at::Tensor features = averaged(pooled);
+    if (config_.attention_mlp > 0) {
+      const at::Tensor hidden = apply_gelu(mlp_hidden_, apply_norm(mlp_norm_, pooled, {}));
+      features = features + apply(mlp_out_, averaged(hidden));
+    }
+    // The parts of a mean, so that the next layer's inputs and its steps in training are as small.
+    if (num_features() > 1) features = features / double(num_features());
+    return features.flatten(2);
   }
 
   // Computes the attention of each camera's queries, [cameras, queries, width], to the tokens of its images, [cameras *

@@ -98,9 +98,9 @@ class _Attention(nn.Module):
     from weighted sums of tokens (docs/explanation/network.md). Keys and values of single tokens are not computed.
     """
 
-    def __init__(self, cameras: int, queries: int, width: int, heads: int, mlp: int) -> None:
+    def __init__(self, cameras: int, queries: int, width: int, heads: int, mlp: int, concatenate: bool) -> None:
         super().__init__()
-        self.heads = heads
+        self.heads, self.concatenate = heads, concatenate
         self.position = nn.Linear(8, width)
         self.token_norm, self.query_norm = nn.LayerNorm(width), nn.LayerNorm(width)
         self.queries = nn.Parameter(torch.randn(cameras, queries, width))
@@ -110,8 +110,8 @@ class _Attention(nn.Module):
             self.mlp_norm, self.mlp_hidden, self.mlp_out = nn.LayerNorm(width), nn.Linear(width, mlp), nn.Linear(mlp, width)
 
     def forward(self, maps: Tensor, first: int) -> Tensor:
-        """Returns embeddings [cameras, batch, width] of feature maps [cameras, batch, width, rows, columns]. `first` is
-        the index of the first of these cameras in the rig."""
+        """Returns embeddings [cameras, batch, width] (queries times width, if they are concatenated) of feature maps
+        [cameras, batch, width, rows, columns]. `first` is the index of the first of these cameras in the rig."""
         cameras, rows, columns = maps.shape[0], *maps.shape[-2:]
         y = (torch.arange(rows, device=maps.device) + 0.5) * (math.pi / rows)
         x = (torch.arange(columns, device=maps.device) + 0.5) * (math.pi / columns)
@@ -127,9 +127,13 @@ class _Attention(nn.Module):
         scores = (tokens.flatten(1, 2) @ asked.transpose(1, 2)).unflatten(1, tokens.shape[1:3])
         sums = (scores.softmax(2).transpose(2, 3) @ tokens).unflatten(2, (-1, self.heads)).flatten(3)
         z = queries.unsqueeze(1) + functional.linear(sums, (out @ value).transpose(0, 1).flatten(1), self.out(self.value.bias))
-        if not hasattr(self, "mlp_norm"):
-            return z.mean(2)
-        return z.mean(2) + self.mlp_out(functional.gelu(self.mlp_hidden(self.mlp_norm(z))).mean(2))
+        features = self._average(z)
+        if hasattr(self, "mlp_norm"):
+            features = features + self.mlp_out(self._average(functional.gelu(self.mlp_hidden(self.mlp_norm(z)))))
+        return (features / features.shape[2]).flatten(2)  # concatenated features are the parts of a mean
+
+    def _average(self, x: Tensor) -> Tensor:
+        return x if self.concatenate else x.mean(2, keepdim=True)
 
 
 class Policy(nn.Module):
@@ -184,9 +188,11 @@ class Policy(nn.Module):
                 for i, o, kernel, stride in zip(channels, channels[1:], config["conv_kernels"], self.strides)
             )
             self.attention = _Attention(
-                num_cameras, config["num_queries"], channels[-1], config["attention_heads"], config["attention_mlp"]
-            )
-            self.project = nn.Linear(num_cameras * channels[-1], 4 * width)
+                num_cameras, config["num_queries"], channels[-1], config["attention_heads"], config["attention_mlp"],
+                bool(config.get("concatenate_queries", False)),
+            )  # fmt: skip
+            pooled = config["num_queries"] if self.attention.concatenate else 1
+            self.project = nn.Linear(num_cameras * pooled * channels[-1], 4 * width)
             around, ego = 4 * width, 7
         elif self.modality == "vector":
             self.sets = [name for name in _SETS if name != "walls" or walls]

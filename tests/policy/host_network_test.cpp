@@ -233,7 +233,7 @@ void expect_equal_networks(const Config& config) {
 
 TEST(HostNetwork, ComputesEveryArchitecture) {
   for (const Modality modality : {Modality::perspective, Modality::vector}) {
-    for (int choice = 0; choice < 8; ++choice) {
+    for (int choice = 0; choice < 16; ++choice) {
       SCOPED_TRACE(choice);
       Config config;
       config.policy = test::tiny_section(modality);
@@ -243,6 +243,7 @@ TEST(HostNetwork, ComputesEveryArchitecture) {
       config.policy.point_features = choice & 4;
       config.policy.segment_features = !(choice & 1);
       config.policy.attention_mlp = choice & 2 ? 0 : 5;
+      config.policy.concatenate_queries = choice & 8;
       config.policy.patch_px = choice + 1;
       config.simulator.walls = choice & 4;
       config.policy.backbone_layers = 1 + choice % 3;

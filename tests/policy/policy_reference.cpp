@@ -91,6 +91,10 @@ int main(int argc, char** argv) try {
   pictura::write_reference(argv[1], "patches", config);
   config.policy.conv_norm = true;
   pictura::write_reference(argv[1], "normalized_convolutions", config);
+  config.policy.concatenate_queries = true;
+  pictura::write_reference(argv[1], "concatenated_queries", config);
+  config.policy.attention_mlp = 5;
+  pictura::write_reference(argv[1], "concatenated_queries_mlp", config);
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "error: %s\n", error.what());

@@ -139,6 +139,15 @@ TEST_P(BothModalities, GradientsOfNormalizedLayersEqualDifferenceQuotients) {
       << "norms and residuals have no parameters";
 }
 
+TEST(Policy, GradientsOfConcatenatedQueriesEqualDifferenceQuotients) {
+  PolicySection section = tiny_section(Modality::perspective);
+  section.concatenate_queries = true;
+  for (const int mlp : {section.attention_mlp, 0}) {
+    section.attention_mlp = mlp;
+    expect_gradients(PolicyNetwork(section, 3, 5, at::kDouble), observation(Modality::perspective, 2));
+  }
+}
+
 // At any scale of the layers before them, the heads' inputs have a mean of 0 and a variance of 1.
 TEST(Policy, HeadsReadNormalizedActivations) {
   PolicySection section = tiny_section(Modality::vector);

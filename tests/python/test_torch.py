@@ -19,7 +19,8 @@ from pictura.torch import Policy, _read_safetensors, export_onnx, load_policy, s
 
 MODELS = sorted((pathlib.Path(__file__).parents[2] / "models").rglob("*.safetensors"))
 NAMES = (
-    "vector", "vector_points", "perspective", "perspective_points", "patches", "normalized", "normalized_convolutions", "segments",
+    "vector", "vector_points", "perspective", "perspective_points", "patches", "normalized", "normalized_convolutions", "concatenated_queries",
+    "concatenated_queries_mlp", "segments",
 )  # fmt: skip
 
 

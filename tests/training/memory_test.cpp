@@ -115,6 +115,7 @@ INSTANTIATE_TEST_SUITE_P(
         std::vector<std::string>{"policy.modality=vector", "policy.layer_norm=true", "policy.residual=true"},
         std::vector<std::string>{"policy.modality=perspective"},
         std::vector<std::string>{"policy.modality=perspective", "policy.conv_norm=true"},
+        std::vector<std::string>{"policy.modality=perspective", "policy.concatenate_queries=true"},
         std::vector<std::string>{"policy.modality=perspective", "policy.patch_px=1",
                                  "policy.conv_kernels=[5, 3, 3, 3, 3]", "policy.conv_strides=[2, 2, 2, 1, 1]"}));
 
