@@ -262,6 +262,7 @@ void patches(const uint8_t* images, int64_t views, int64_t cameras, int64_t came
                         : patch_px == 2 ? patches_of_image<2>
                         : patch_px == 3 ? patches_of_image<3>
                         : patch_px == 4 ? patches_of_image<4>
+                        : patch_px == 6 ? patches_of_image<6>
                                         : patches_of_image<0>;
   const int64_t numbers =
       ((height + patch_px - 1) / patch_px) * ((width + patch_px - 1) / patch_px) * kColors * patch_px * patch_px;

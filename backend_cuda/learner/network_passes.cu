@@ -266,10 +266,10 @@ __global__ void __launch_bounds__(kThreads)
 }
 
 // Loads the row of a patch. `count` of its pixels lie in the image, and the others are black. If `is_aligned`, rows
-// begin at multiples of their size, and one load reads a whole row.
+// begin at multiples of their size. Loads then read as many pixels at once as the largest power of two that divides it.
 template <int kPatch>
 __device__ void load_patch_row(const uint8_t* from, int count, bool is_aligned, uint8_t (&pixels_out)[kPatch]) {
-  struct alignas(kPatch == 3 ? 1 : kPatch) Row {
+  struct alignas(kPatch & -kPatch) Row {
     uint8_t pixels[kPatch];
   };
   Row row{};
@@ -413,6 +413,7 @@ void with_patch(int64_t patch_px, F&& f) {
     case 2: return f(std::integral_constant<int, 2>{});
     case 3: return f(std::integral_constant<int, 3>{});
     case 4: return f(std::integral_constant<int, 4>{});
+    case 6: return f(std::integral_constant<int, 6>{});
     default: return;
   }
 }

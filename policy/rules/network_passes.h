@@ -23,7 +23,7 @@ struct ActivationSize {
 /// channels are 0. Black pixels complete the last patches.
 struct PatchSize {
   int64_t views = 0, cameras = 0, height_px = 0, width_px = 0, patch_px = 1;
-  static constexpr bool supports(int64_t patch_px) { return patch_px >= 1 && patch_px <= 4; }
+  static constexpr bool supports(int64_t patch_px) { return (patch_px >= 1 && patch_px <= 4) || patch_px == 6; }
   /// Channels of a patch, rounded up to a multiple of 8 for matrix units.
   PICTURA_HD static constexpr int64_t channels_of(int64_t patch_px) { return (3 * patch_px * patch_px + 7) / 8 * 8; }
   PICTURA_HD int64_t rows() const { return (height_px + patch_px - 1) / patch_px; }

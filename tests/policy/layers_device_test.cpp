@@ -286,15 +286,18 @@ TEST_P(DeviceLayers, RowFeatures) {
 }
 
 TEST_P(DeviceLayers, ImagePatchesEqualTheHostsWithZeroChannels) {
-  const at::Tensor images =
-      at::arange(3 * 2 * 3 * 10 * 13, at::kInt).remainder(251).to(at::kByte).reshape({3, 2, 3, 10, 13});
-  for (const int64_t patch_px : {1, 2, 3, 4, 8, 12}) {
-    const at::Tensor expected = image_patches(images, patch_px, activations());
-    const at::Tensor got = image_patches(images.to(at::kCUDA), patch_px, activations()).to(at::kCPU);
-    EXPECT_TRUE(got.narrow(1, 0, expected.size(1)).equal(expected)) << patch_px;
-    EXPECT_EQ(got.size(1) % 8, 0);
-    EXPECT_EQ(got.slice(1, expected.size(1)).abs().sum().item<float>(), 0);
-    EXPECT_TRUE(got.is_contiguous(at::MemoryFormat::ChannelsLast));
+  for (const int64_t width : {12, 13}) {  // whole patches in most sizes, and black pixels that complete them
+    const at::Tensor images =
+        at::arange(3 * 2 * 3 * 10 * width, at::kInt).remainder(251).to(at::kByte).reshape({3, 2, 3, 10, width});
+    for (const int64_t patch_px : {1, 2, 3, 4, 6, 8, 12}) {
+      SCOPED_TRACE(fmt::format("width {}, patches of {} px", width, patch_px));
+      const at::Tensor expected = image_patches(images, patch_px, activations());
+      const at::Tensor got = image_patches(images.to(at::kCUDA), patch_px, activations()).to(at::kCPU);
+      EXPECT_TRUE(got.narrow(1, 0, expected.size(1)).equal(expected));
+      EXPECT_EQ(got.size(1) % 8, 0);
+      EXPECT_EQ(got.slice(1, expected.size(1)).abs().sum().item<float>(), 0);
+      EXPECT_TRUE(got.is_contiguous(at::MemoryFormat::ChannelsLast));
+    }
   }
 }
 

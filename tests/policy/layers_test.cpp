@@ -19,15 +19,19 @@ TEST(ImagePatches, PutEachPixelIntoAChannelAndPadWithBlack) {
   const int64_t views = 2, cameras = 2;
   const at::Tensor images =
       at::arange(views * cameras * 3 * 5 * 6, at::kInt).remainder(251).to(at::kByte).reshape({views, cameras, 3, 5, 6});
-  const at::Tensor patches = image_patches(images, 4, at::kFloat);
-  ASSERT_EQ(patches.sizes().vec(), (std::vector<int64_t>{cameras * views, 48, 2, 2}));
-  EXPECT_TRUE(patches.is_contiguous(at::MemoryFormat::ChannelsLast));
-  for (int64_t n = 0; n < cameras * views; ++n) {
-    for (int64_t c = 0; c < 3; ++c) {
-      for (int64_t y = 0; y < 8; ++y) {
-        for (int64_t x = 0; x < 8; ++x) {
-          const float expected = y < 5 && x < 6 ? images[n % views][n / views][c][y][x].item<float>() : 0;
-          EXPECT_EQ(patches[n][(c * 4 + y % 4) * 4 + x % 4][y / 4][x / 4].item<float>(), expected) << c << y << x;
+  for (const int64_t side : {4, 6}) {
+    const at::Tensor patches = image_patches(images, side, at::kFloat);
+    const int64_t rows = (5 + side - 1) / side, columns = (6 + side - 1) / side;
+    ASSERT_EQ(patches.sizes().vec(), (std::vector<int64_t>{cameras * views, 3 * side * side, rows, columns}));
+    EXPECT_TRUE(patches.is_contiguous(at::MemoryFormat::ChannelsLast));
+    for (int64_t n = 0; n < cameras * views; ++n) {
+      for (int64_t c = 0; c < 3; ++c) {
+        for (int64_t y = 0; y < rows * side; ++y) {
+          for (int64_t x = 0; x < columns * side; ++x) {
+            const float expected = y < 5 && x < 6 ? images[n % views][n / views][c][y][x].item<float>() : 0;
+            const int64_t channel = (c * side + y % side) * side + x % side;
+            EXPECT_EQ(patches[n][channel][y / side][x / side].item<float>(), expected) << side << c << y << x;
+          }
         }
       }
     }
