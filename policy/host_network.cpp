@@ -395,8 +395,7 @@ class ImageEncoder {
     }
   }
 
-  // Number of features of one camera, each of width_.
-  int64_t num_features() const { return config_.concatenate_queries ? config_.num_queries : 1; }
+  int64_t num_features() const { return num_camera_features(config_); }
   int64_t camera_width() const { return num_features() * width_; }
 
   // Averages the rows of the queries that form one feature, for each feature.

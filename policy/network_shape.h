@@ -22,6 +22,11 @@ inline RowFeatures row_features_of(const PolicySection& policy, std::string_view
           .position_unit_m = kScalePosition_m};
 }
 
+/// Number of features of a camera, each as wide as a token: the mean over its queries, or one for each of them.
+inline int num_camera_features(const PolicySection& policy) {
+  return policy.concatenate_queries ? policy.num_queries : 1;
+}
+
 /// Number of sines and cosines that encode a token's position.
 constexpr int kPositionFeatures = 8;
 

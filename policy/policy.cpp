@@ -255,8 +255,7 @@ class PerspectiveEncoder final : public SceneEncoder {
     return x;
   }
 
-  // Number of features of one camera, each of width_.
-  int64_t num_features() const { return config_.concatenate_queries ? config_.num_queries : 1; }
+  int64_t num_features() const { return num_camera_features(config_); }
 
   // Returns the features of a block's cameras, [cameras, batch, num_features() * width]. A mean over queries is
   // computed before the MLP's last layer, which is linear, so that this layer processes one row instead of num_queries
@@ -280,7 +279,8 @@ class PerspectiveEncoder final : public SceneEncoder {
       const at::Tensor hidden = apply_gelu(mlp_hidden_, apply_norm(mlp_norm_, pooled, {}));
       features = features + apply(mlp_out_, averaged(hidden));
     }
-    // The parts of a mean, so that the next layer's inputs and its steps in training are as small.
+    // Concatenated features are the parts of a mean, so that the next layer's inputs and its steps in training are as
+    // small.
     if (num_features() > 1) features = features / double(num_features());
     return features.flatten(2);
   }

@@ -162,9 +162,9 @@ void add_images(const Config& config, const Rig& rig, LayerSum* sum) {
   if (policy.attention_mlp > 0) {
     sum->add_parameters(2 * width);
     sum->add(rows, width, policy.attention_mlp, 2);
-    sum->add(policy.concatenate_queries ? rows : cameras, policy.attention_mlp, width, 2);
+    sum->add(cameras * num_camera_features(policy), policy.attention_mlp, width, 2);
   }
-  const double features = (policy.concatenate_queries ? rows : cameras) * width;
+  const double features = cameras * num_camera_features(policy) * width;
   sum->add_values(features, 1);
   sum->add(1, features, 4.0 * policy.embedding_width, 1);
 }

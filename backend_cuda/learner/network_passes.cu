@@ -266,7 +266,7 @@ __global__ void __launch_bounds__(kThreads)
 }
 
 // Loads the row of a patch. `count` of its pixels lie in the image, and the others are black. If `is_aligned`, rows
-// begin at multiples of their size. Loads then read as many pixels at once as the largest power of two that divides it.
+// begin at multiples of their size. One load then reads the largest power of two of pixels that divides kPatch.
 template <int kPatch>
 __device__ void load_patch_row(const uint8_t* from, int count, bool is_aligned, uint8_t (&pixels_out)[kPatch]) {
   struct alignas(kPatch & -kPatch) Row {
