@@ -27,11 +27,12 @@ WAITS = "--serve"
 
 def shorter(line):
     words = shlex.split(line, comments=True)
+    has_trunk = "--init-trunk-from" in words  # policies in models/ have other widths than smoke.toml
     for i, word in enumerate(words[:-1]):
         takes_over = words[:2] == ["probe", "corner"] and word == "--steps"  # for 80 steps
         if word in AT_MOST and words[i + 1].isdigit() and not takes_over:  # --scenarios 0:4 is not a number
             words[i + 1] = str(min(int(words[i + 1]), AT_MOST[word]))
-        if word == "--config" and "--init-trunk-from" not in words:  # such runs need the widths of models/
+        if word == "--config" and not has_trunk:
             words[i + 1] = "configs/smoke.toml"
         if word == "--backend":
             words[i + 1] = "cpu"
@@ -41,7 +42,7 @@ def shorter(line):
     if words[0] == "train":
         words += ["--set", "train.updates=1", "--set", "simulator.num_slots=8"]
         words += [] if "--resume" in words else ["--overwrite"]
-        words += ["--set", 'simulator.maps=["procedural"]', "--set", "train.num_steps=6"] if "--init-trunk-from" in words else []
+        words += ["--set", 'simulator.maps=["procedural"]', "--set", "train.num_steps=6"] if has_trunk else []
     if words[0] == "bench":
         words += ["--repeats", "1", "--repeat-seconds", "0.1"] if words[1] in ("render", "simulate") else []
     if words[0] == "probe":  # whose first states are those of step --every
