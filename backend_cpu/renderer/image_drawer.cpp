@@ -406,11 +406,13 @@ void ImageDrawer::draw_planes(const ImageTarget& target) const {
   auto add_row = [&](int y, bool is_again) {
     for (const ScreenFace& face : faces_) {
       if (y < face.box.y_begin || y >= face.box.y_end) continue;
-      for (int x = face.box.x_begin; x < face.box.x_end; ++x) {
+      const PolygonEdge* const edges = edges_.at(face.edge_begin);
+      const RowSpan span = row_span(edges, face.edge_count, face.box, y);
+      for (int x = span.begin; x < span.end; ++x) {
         const Vec2 center = pixel_center(x, y);
         FrontFace& front = fronts[x];
         if (is_again && !front.needs_second_pass()) continue;
-        if (!covers_point(edges_.at(face.edge_begin), face.edge_count, center.x, center.y)) continue;
+        if (!covers_center(edges, face.edge_count, span, x, center)) continue;
         is_again ? front.add_second_pass(face, center) : front.add(face, center);
       }
     }

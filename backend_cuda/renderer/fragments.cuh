@@ -124,18 +124,33 @@ struct TileSpan {
   __device__ int full_end() const { return static_cast<int>(bytes >> 16 & 0xFF); }
   __device__ int end() const { return static_cast<int>(bytes >> 24); }
   __device__ int num_full() const { return full_end() - full_begin(); }
+  /// Returns the columns relative to the tile.
+  __device__ RowSpan row() const { return {begin(), end(), full_begin(), full_end()}; }
   /// Returns the k-th partly covered column, left or right of the fully covered columns.
   __device__ int partial(int k) const { return begin() + k + (begin() + k < full_begin() ? 0 : num_full()); }
 };
 
-// Marks each pixel of a part with its full face, and lists the partly covered pixels. The lanes of a warp take distant
-// rows, because neighbouring rows often belong to one large face. Collective over the block.
-template <typename Memory>
-__device__ void mark_and_list(const Memory& memory, const Part& part) {
+// A row of a face that a lane shares with its warp.
+struct SharedRow {
+  int face, y;
+  TileSpan span;
+  /// owner: lane that shares its row; -1: any lane.
+  template <typename Memory>
+  __device__ static SharedRow of(int owner, typename Memory::Word row, TileSpan span, const Part& part) {
+    const int from = max_of(owner, 0);
+    const typename Memory::Word its_row = __shfl_sync(kAllLanes, row, from);
+    return {static_cast<int>(its_row >> Memory::kHalf), part.y_begin + static_cast<int>(its_row & Memory::kNone),
+            TileSpan(__shfl_sync(kAllLanes, span.bytes, from))};
+  }
+};
+
+// Calls visit(index, row, span) for the listed rows of faces, with a row per lane; lanes without a row get an empty
+// span. The lanes of a warp take distant rows, because neighbouring rows often belong to one large face. Collective
+// over the block.
+template <typename Memory, typename Visit>
+__device__ void for_each_row(const Memory& memory, const Part& part, const Visit& visit) {
   using Word = typename Memory::Word;
-  BlockState* state = memory.state;
-  WarpState* warp = &state->warps[warp_index()];
-  const int num_rows = state->num_rows, passes = passes_of<Memory::kThreads>(num_rows);
+  const int num_rows = memory.state->num_rows, passes = passes_of<Memory::kThreads>(num_rows);
   PICTURA_NO_UNROLL
   for (int pass = warp_index(); pass < passes; pass += Memory::kThreads / kWarpSize) {
     const int at = lane_index() * passes + pass;
@@ -147,22 +162,22 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
       const int y = part.y_begin + static_cast<int>(row & Memory::kNone);
       span = TileSpan(row_span(memory.edges + face.edge_begin, face.edge_count, face.box, y), part);
     }
+    visit(at, row, span);
+  }
+}
+
+// Marks each pixel of a part with its full face, and lists the partly covered pixels. Collective over the block.
+template <typename Memory>
+__device__ void mark_and_list(const Memory& memory, const Part& part) {
+  using Word = typename Memory::Word;
+  BlockState* state = memory.state;
+  WarpState* warp = &state->warps[warp_index()];
+  for_each_row(memory, part, [&](int, Word row, TileSpan span) {
     const int full = span.num_full(), partial = span.end() - span.begin() - full;
     // Both prefix sums in one word: neither reaches 2^16.
     const int ends = warp_inclusive_sum(full | partial << 16), full_end = ends & 0xFFFF, partial_end = ends >> 16;
-    struct SharedRow {
-      int face, y;
-      TileSpan span;
-    };
-    auto row_of = [&](int owner) {
-      const int from = max_of(owner, 0);
-      const Word its_row = __shfl_sync(kAllLanes, row, from);
-      return SharedRow{static_cast<int>(its_row >> Memory::kHalf),
-                       part.y_begin + static_cast<int>(its_row & Memory::kNone),
-                       TileSpan(__shfl_sync(kAllLanes, span.bytes, from))};
-    };
     warp_expand(warp, full, full_end, [&](int, int owner, int k) {
-      const SharedRow its = row_of(owner);
+      const SharedRow its = SharedRow::of<Memory>(owner, row, span, part);
       const int x = part.x_begin + its.span.full_begin() + k, pixel = part.pixel(x, its.y);
       const int farther = owner >= 0 ? mark_pixel(memory, its.face, x, its.y, pixel) : -1;
       if (!__any_sync(kAllLanes, farther >= 0)) return;
@@ -171,11 +186,11 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
     });
     const int32_t index = warp_allocate(&state->num_candidates, partial_end);
     warp_expand(warp, partial, partial_end, [&](int item, int owner, int k) {
-      const SharedRow its = row_of(owner);
+      const SharedRow its = SharedRow::of<Memory>(owner, row, span, part);
       const int pixel = part.pixel(part.x_begin + its.span.partial(k), its.y);
       if (owner >= 0) list_candidate(memory, index + item, its.face, pixel, false);
     });
-  }
+  });
 }
 
 // Whether a pixel has only this fragment and no full face.

@@ -27,7 +27,7 @@ __device__ bool draw_image_part(const Memory& memory, const DrawTask& task, int3
   const ImageWriter writer{task.format, task.order, slot.color, view * slot.view_stride,
                            plane,       width,      height,     task.patch_px};
   if (!draw_faces(memory, num_faces, part, NoVisit{}, writer)) return false;
-  if (task.wants_planes) draw_planes<Memory>(slot.planes, width, view * plane, num_faces, part);
+  if (task.wants_planes) draw_planes<Memory>(PlaneWriter{slot.planes, width, view * plane}, num_faces, part);
   return true;
 }
 

@@ -180,4 +180,13 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
   return span;
 }
 
+/// Whether a polygon covers the centre of a pixel. span: row_span() of the pixel's row, and the pixel's column relative
+/// to the same column as the span's.
+PICTURA_HD inline bool covers_center(const PolygonEdge* edges, int count, const RowSpan& span, int column,
+                                     Vec2 center_px) {
+  if (column < span.begin || column >= span.end) return false;
+  const bool is_full = column >= span.full_begin && column < span.full_end;
+  return is_full || covers_point(edges, count, center_px.x, center_px.y);
+}
+
 }  // namespace pictura
