@@ -32,7 +32,7 @@ struct RendererConfig {
   PixelSamples samples;
   CameraRandomization randomization;  // `gl` randomizes only poses and focal lengths
   /// Only for `cuda`: bound on device memory besides images, scenes and maps. Larger calls draw their images in parts.
-  std::size_t max_scratch_bytes = std::size_t{512} << 20;
+  std::size_t max_scratch_bytes = std::size_t{1} << 30;
 };
 
 /// Base class of renderers. Only one thread at a time may use an object.

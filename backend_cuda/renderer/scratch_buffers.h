@@ -5,9 +5,9 @@
 
 namespace pictura::cuda {
 
-/// Capacity of the pool per image: the average need in CARLA's towns. Each face has four edges; the other edges are for
-/// clipped faces.
-constexpr std::size_t kPoolFaces = 200, kPoolEdges = 928;
+/// Capacity of the pool per image: the average need in CARLA's Town03, whose images have the most faces. Each face has
+/// four edges; the other edges are for clipped faces.
+constexpr std::size_t kPoolFaces = 320, kPoolEdges = 1488;
 /// Additional capacity, in images, for small batches with many faces per image.
 constexpr std::size_t kMinPoolImages = 4 * kMaxEntries / kPoolFaces + 1;
 static_assert(kMinPoolImages * kPoolFaces >= kMaxEntries, "a deferred image fits into the pool");

@@ -336,8 +336,9 @@ TEST(EmulatedKernels, DrawImagesHigherThanTheLastLaunchDrawsAtOnce) {
 
 // Each image has one face more than full batches, so the number of batches is the maximum.
 TEST(EmulatedKernels, HaveCapacityForTheBatchesOfManyEqualImages) {
+  constexpr int kFaces = cuda::FaceBatch::count_of(cuda::kPoolFaces) * cuda::FaceBatch::kEntries + 1;
   Snapshot town;
-  for (int i = 0; i < 225; ++i) {
+  for (int i = 0; i < kFaces; ++i) {
     const float x = 5.0f + 0.1f * static_cast<float>(i);
     town.geometry.walls.push_back({{x, -1, 0}, {x, 1, 0}, 1.0f + 0.02f * static_cast<float>(i)});
   }
