@@ -33,18 +33,18 @@ void add_train_command(CLI::App& app) {
       ->add_flag("--overwrite", arguments->overwrite,
                  "Start a new run; the existing run in --out is removed once the new run has a checkpoint")
       ->excludes(resume);
-  CLI::Option* const init_from =
-      command
-          ->add_option("--init-from", arguments->train.init_from,
-                       "Checkpoint or safetensors file with the initial weights; it must have the same network, at any "
-                       "image size")
-          ->excludes(resume);
   command
-      ->add_option("--init-trunk-from", arguments->train.init_trunk_from,
-                   "Checkpoint or safetensors file with the initial weights of all layers behind the encoder of images "
-                   "or lists; it may have the other modality")
-      ->excludes(resume)
-      ->excludes(init_from);
+      ->add_option("--init-from", arguments->train.init_from,
+                   "Checkpoint or safetensors file with the initial weights; it must have the same network, at any "
+                   "image size")
+      ->excludes(resume);
+  command
+      ->add_option(
+          "--init-trunk-from", arguments->train.init_trunk_from,
+          "Checkpoint or safetensors file with the initial weights of all layers behind the encoder of images "
+          "or lists; it may have the other modality. With --init-from, only the encoder's weights are those of "
+          "--init-from")
+      ->excludes(resume);
   add_number_option(command, "--minutes", arguments->train.minutes,
                     "Limit of the wall time: saves and ends before an update that may exceed it, as estimated from the "
                     "longest update so far; continue with --resume",

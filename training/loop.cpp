@@ -188,8 +188,8 @@ TrainReport train_on_its_device(const TrainOptions& options, Ranks* ranks) {
   if (!(options.minutes >= 0 && std::isfinite(options.minutes))) {
     fail_usage("train: minutes: expected 0 (no limit) or more, got {}", options.minutes);
   }
-  if (!options.init_trunk_from.empty() && (!options.init_from.empty() || options.old_run == OldRun::resume)) {
-    fail_usage("train: init_trunk_from '{}': expected neither init_from nor resume", options.init_trunk_from);
+  if (!options.init_trunk_from.empty() && options.old_run == OldRun::resume) {
+    fail_usage("train: init_trunk_from '{}': expected a new run, got resume", options.init_trunk_from);
   }
   const Config config = load_config(options.config_path, options.overrides);
   check_equal_settings(config,

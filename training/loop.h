@@ -49,7 +49,7 @@ struct TrainOptions {
   std::string out_folder;
   OldRun old_run = OldRun::refuse;
   std::string init_from;        // checkpoint or safetensors, from which only weights are read
-  std::string init_trunk_from;  // file for Run::load_trunk(); excludes init_from and OldRun::resume
+  std::string init_trunk_from;  // file for Run::load_trunk(), after init_from; excludes OldRun::resume
   double minutes = 0;           // wall-time limit, start-up included; 0: none
   std::string commit;           // commit of this program, for metadata
   Launch launch;
