@@ -14,7 +14,14 @@ void print_realism(const RealismReport& report) {
   for (const std::string& id : report.unused) unused.push_back(fmt::format("scenario '{}'", id));
   print_warnings("rollouts without a scene", unused);
   int64_t road_users = 0;
-  for (const SceneRealism& scene : report.scenes) road_users += scene.scored;
+  std::vector<std::string> other_counts;
+  for (const SceneRealism& scene : report.scenes) {
+    road_users += scene.scored;
+    if (scene.rollouts == kChallengeRollouts) continue;
+    other_counts.push_back(fmt::format("scenario '{}': expected {} rollouts, got {}", scene.scenario_id,
+                                       kChallengeRollouts, scene.rollouts));
+  }
+  print_warnings("scores of another number of rollouts are not comparable", other_counts);
   const RealismVersion& version = realism_version(report.version);
   print_result("realism {}: {} scenes, {} road users scored, {} scenes without rollouts\n\n", report.version,
                report.scenes.size(), road_users, report.without_rollouts);

@@ -18,7 +18,7 @@ namespace pictura {
 
 namespace {
 
-constexpr int kChallengeStart = 10, kChallengeSteps = 80, kChallengeRollouts = 32;
+constexpr int kChallengeStart = 10, kChallengeSteps = 80;
 
 // Field numbers and enumeration values of the schema.
 enum class Submission : uint8_t { scenario_rollouts = 1, submission_type = 2 };

@@ -27,8 +27,10 @@ struct SceneRollouts {
   std::vector<std::vector<SimulatedState>> rollouts;  // [rollouts][objects * steps]
 };
 
-/// Throws UsageError if the protocol differs from the challenge's: 32 rollouts of 80 steps from step 10 on, with all
-/// present road users.
+/// Number of rollouts of each scene in the challenge.
+constexpr int kChallengeRollouts = 32;
+/// Throws UsageError if the protocol differs from the challenge's: kChallengeRollouts of 80 steps from step 10 on, with
+/// all present road users.
 void check_rollouts(const SceneProtocol& protocol);
 
 /// Encodes a message ScenarioRollouts (waymo_open_dataset/protos/sim_agents_submission.proto). Throws Error if a track

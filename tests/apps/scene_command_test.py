@@ -26,6 +26,38 @@ def refusal(*words, command="simulate"):
     return run(*words, status=2, command=command).stderr
 
 
+def varint(data, at):
+    """Returns the protobuf integer at data[at:], and the index after it."""
+    value = shift = 0
+    while True:
+        byte = data[at]
+        value, shift, at = value | (byte & 127) << shift, shift + 7, at + 1
+        if byte < 128:
+            return value, at
+
+
+def encoded(value):
+    """Returns a protobuf integer."""
+    out = bytearray()
+    while value > 127:
+        out.append(value & 127 | 128)
+        value >>= 7
+    return bytes([*out, value])
+
+
+def without_last_rollout(data):
+    """Returns rollouts of one scene, which are the last field of the file and of the scene, without the last rollout."""
+    _, after = varint(data, varint(data, 0)[1])  # the type of the submission
+    begin = varint(data, after)[1]
+    scene = data[varint(data, begin)[1] :]
+    at = 0
+    while at < len(scene):
+        last = at
+        length, content = varint(scene, varint(scene, at)[1])
+        at = content + length
+    return data[:begin] + encoded(last) + scene[:last]
+
+
 def facts(scene):
     return json.loads(run(scene, "--json").stdout)
 
@@ -193,6 +225,11 @@ with tempfile.TemporaryDirectory() as name:
         report = json.loads(run(*sim_agents, "--realism", "2025", "--json", command="evaluate").stdout)["realism"]
         score = json.loads(run(rollouts, "--scenes", scene, "--json", command="score").stdout)
         assert score == report and 0 < score["realism"] < 1 and score["scored"] == 1 and len(score["likelihoods"]) == 10, score
+        fewer = folder / "fewer.binproto"
+        fewer.write_bytes(without_last_rollout(rollouts.read_bytes()))
+        warning = run(fewer, "--scenes", scene, command="score").stderr
+        assert "not comparable: scenario 'fixture00000001': expected 32 rollouts, got 31" in warning, warning
+        assert run(rollouts, "--scenes", scene, command="score").stderr.count("warning") == 0
         table = run(rollouts, "--scenes", folder / "pufferdrive_v1.bin", command="score", status=1).stderr
         assert "rollouts.binproto: expected rollouts of a scene of" in table and "1 are not in it" in table, table
         table = run(*sim_agents, "--realism", "2024", command="evaluate").stdout
