@@ -560,7 +560,7 @@ struct DeviceSets : Function<DeviceSets> {
                             const at::Tensor& hidden_weight, const at::Tensor& hidden_bias, const at::Tensor& weight,
                             const at::Tensor& bias, at::Tensor* which_out) {
     const at::TensorOptions options = members.options().requires_grad(false);
-    at::Tensor out = at::empty({size.sets(), SetSize::kChannels}, options.dtype(at::kBFloat16));
+    at::Tensor out = at::empty({size.sets(), size.channels}, options.dtype(at::kBFloat16));
     if (which_out) *which_out = at::empty(out.sizes(), options.dtype(at::kByte));
     passes_on(members.device())
         ->largest_embedding(size, floats_of(members), counts.const_data_ptr<int32_t>(),
@@ -720,7 +720,9 @@ bool has_fused_set_encoder(const at::Tensor& members, const RowFeatures& feature
                            const at::Tensor& weight) {
   if (is_on_host(members)) return true;
   return is_bf16_on_device(members) && members.scalar_type() == at::kFloat &&
-         SetSize::supports(weight.size(0), hidden_weight.size(0), members.size(2) + features.count(), members.size(1));
+         SetSize::supports(weight.size(0), hidden_weight.size(0), members.size(2) + features.count(),
+                           members.size(1)) &&
+         passes_on(members.device())->fits_set_encoder(weight.size(0));
 }
 
 at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts, const RowFeatures& features,
@@ -729,7 +731,8 @@ at::Tensor largest_embedding(const at::Tensor& members, const at::Tensor& counts
   const at::Tensor all = members.contiguous();
   const bool has_way_back = keeps_gradients({hidden_weight, hidden_bias, weight, bias});
   if (members.is_cuda()) {
-    const SetSize size{row_size(members, features, /*keeps_rows=*/true), members.size(1), counts.stride(0), has_norm};
+    const SetSize size{row_size(members, features, /*keeps_rows=*/true), members.size(1), counts.stride(0), has_norm,
+                       weight.size(0)};
     if (has_way_back) return DeviceSets::apply(all, counts, size, hidden_weight, hidden_bias, weight, bias);
     return DeviceSets::compute(all, counts, size, hidden_weight, hidden_bias, weight, bias, nullptr);
   }

@@ -61,6 +61,12 @@ class NetworkPassesCuda final : public NetworkPasses {
     launch(cuda::launch_patches, stream, size, images, type, out);
   }
 
+  bool fits_set_encoder(int64_t channels) const override {
+    int bytes = 0;
+    PICTURA_CUDA(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, device_.index));
+    return cuda::set_encoder_bytes(channels) <= bytes;
+  }
+
   void largest_embedding(const SetSize& size, const float* members, const int32_t* counts,
                          const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
                          Stream stream) override {
@@ -88,8 +94,9 @@ class NetworkPassesCuda final : public NetworkPasses {
 
  private:
   static void check(const SetSize& size) {
-    PICTURA_CHECK(SetSize::supports(SetSize::kChannels, SetSize::kChannels, size.members.width(), size.max_members),
-                  "largest_embedding: {} members of {} numbers", size.max_members, size.members.width());
+    PICTURA_CHECK(SetSize::supports(size.channels, size.channels, size.members.width(), size.max_members),
+                  "largest_embedding: {} members of {} numbers, {} channels", size.max_members, size.members.width(),
+                  size.channels);
   }
 
   template <typename Launcher, typename... Arguments>

@@ -1,505 +1,67 @@
-// Encoding of sets of members by an MLP to the largest embeddings of each set, and its backward pass, on tensor cores.
-// Values per member stay in registers, whereas ATen would keep them in memory. Products are in bf16, sums in fp32 in a
-// fixed order.
-#include <cuda_bf16.h>
+// Launches of the kernels that encode sets.
+#include <algorithm>
 
-#include "pictura/backend_cuda/learner/activation.cuh"
 #include "pictura/backend_cuda/learner/network_kernels.h"
+#include "pictura/backend_cuda/learner/tensor_core.cuh"
+// Include this after the functions of tensor cores.
+#include "pictura/backend_cuda/learner/set_encoder.cuh"
 
 namespace pictura::cuda {
 
 namespace {
 
-using Half = __nv_bfloat16;
-
-constexpr int kWarps = 4, kThreads = kWarps * kWarp;
-constexpr int kTile = 16;  // number of members that a warp processes together
-constexpr int kChannels = SetSize::kChannels, kInputs = SetSize::kMaxWidth;
-constexpr int kColumnTiles = kChannels / 8;
-// Strides of rows in shared memory. With these strides, rows that a warp reads together are in different banks.
-constexpr int kInputStride = kInputs + 8, kChannelStride = kChannels + 8;
-
-__device__ int lane() { return static_cast<int>(threadIdx.x) % kWarp; }
-__device__ int warp() { return static_cast<int>(threadIdx.x) / kWarp; }
-// Place of a lane's numbers in the fragments of a product: rows fragment_row() and the row 8 below, columns
-// fragment_column() and the next.
-__device__ int fragment_row() { return lane() / 4; }
-__device__ int fragment_column() { return lane() % 4 * 2; }
-
-__device__ uint32_t pack(float low, float high) {
-  const __nv_bfloat162 pair = __floats2bfloat162_rn(low, high);
-  return *reinterpret_cast<const uint32_t*>(&pair);
-}
-__device__ uint32_t pair_at(const Half* numbers) { return *reinterpret_cast<const uint32_t*>(numbers); }
-
-/// 16 rows of 16 numbers: the left operand of a product.
-struct LeftTile {
-  uint32_t pairs[4];
-};
-/// 16 rows of kChannels sums, 8 columns at a time. Per 8 columns, a lane holds two columns of two rows.
-struct Sums {
-  float values[kColumnTiles][4] = {};
-
-  /// Calls f(row of the lane's two, column tile, column of the lane's two, value&) for each value.
-  template <typename F>
-  __device__ void each(F&& f) {
-#pragma unroll
-    for (int n = 0; n < kColumnTiles; ++n) {
-#pragma unroll
-      for (int i = 0; i < 4; ++i) f(i / 2, n, i % 2, values[n][i]);
-    }
-  }
-};
-
-/// Computes sums += left * right. `low` holds rows 2 (lane % 4) and the next of the right operand in column lane / 4,
-/// and `high` the rows 8 below.
-__device__ void multiply_add(const LeftTile& left, uint32_t low, uint32_t high, float (&sums)[4]) {
-  asm volatile(
-      "mma.sync.aligned.m16n8k16.row.col.f32.bf16.bf16.f32 {%0, %1, %2, %3}, {%4, %5, %6, %7}, {%8, %9}, {%0, %1, %2, "
-      "%3};"
-      : "+f"(sums[0]), "+f"(sums[1]), "+f"(sums[2]), "+f"(sums[3])
-      : "r"(left.pairs[0]), "r"(left.pairs[1]), "r"(left.pairs[2]), "r"(left.pairs[3]), "r"(low), "r"(high));
+// Launches a kernel with an object of type Memory in shared memory.
+template <typename Memory, int kChannels, typename... Parameters, typename... Arguments>
+void launch(void (*kernel)(Parameters...), int64_t blocks, cudaStream_t stream, const Arguments&... arguments) {
+  cudaFuncSetAttribute(reinterpret_cast<const void*>(kernel), cudaFuncAttributeMaxDynamicSharedMemorySize,
+                       sizeof(Memory));
+  kernel<<<static_cast<unsigned>(blocks), set_encoder::kWarps<kChannels> * kWarp, sizeof(Memory), stream>>>(
+      arguments...);
 }
 
-/// Loads a left operand from shared memory: columns [column, column + 16) of 16 rows.
-__device__ LeftTile left_tile(const Half* rows, int stride, int column) {
-  const Half* const first = rows + fragment_row() * stride + column + fragment_column();
-  return {{pair_at(first), pair_at(first + 8 * stride), pair_at(first + 8), pair_at(first + 8 * stride + 8)}};
-}
-
-/// Converts sums to a left operand: their columns [16 k, 16 k + 16).
-__device__ LeftTile left_tile(const Sums& sums, int k) {
-  const auto &first = sums.values[2 * k], &second = sums.values[2 * k + 1];
-  return {{pack(first[0], first[1]), pack(first[2], first[3]), pack(second[0], second[1]), pack(second[2], second[3])}};
-}
-
-/// Adds the product of a left operand and the transpose of kChannels rows in shared memory, columns [column, column +
-/// 16).
-__device__ void multiply_add_rows(const LeftTile& left, const Half* rows, int stride, int column, Sums* sums) {
-#pragma unroll
-  for (int n = 0; n < kColumnTiles; ++n) {
-    const Half* const first = rows + (8 * n + fragment_row()) * stride + column + fragment_column();
-    multiply_add(left, pair_at(first), pair_at(first + 8), sums->values[n]);
-  }
-}
-
-/// Loads four blocks of 8 x 8 numbers, transposed: a lane provides the address of a row of block lane / 8.
-__device__ void load_transposed(const Half* row, uint32_t (&blocks_out)[4]) {
-  const auto address = static_cast<uint32_t>(__cvta_generic_to_shared(row));
-  asm volatile("ldmatrix.sync.aligned.m8n8.x4.trans.shared.b16 {%0, %1, %2, %3}, [%4];"
-               : "=r"(blocks_out[0]), "=r"(blocks_out[1]), "=r"(blocks_out[2]), "=r"(blocks_out[3])
-               : "r"(address));
-}
-
-/// Loads the transpose of 16 rows of shared memory as a left operand: their columns [column, column + 16).
-__device__ LeftTile transposed_left_tile(const Half* rows, int stride, int column) {
-  LeftTile left;
-  load_transposed(rows + (lane() % 8 + lane() / 16 * 8) * stride + column + lane() / 8 % 2 * 8, left.pairs);
-  return left;
-}
-
-/// Adds the product of a left operand and 16 rows of shared memory, over 8 * kTiles columns.
-template <int kTiles>
-__device__ void multiply_add_columns(const LeftTile& left, const Half* rows, int stride, float (&sums)[kTiles][4]) {
-  static_assert(kTiles % 2 == 0);
-#pragma unroll
-  for (int n = 0; n < kTiles; n += 2) {
-    uint32_t blocks[4];
-    load_transposed(rows + lane() % 16 * stride + 8 * n + lane() / 16 * 8, blocks);
-    multiply_add(left, blocks[0], blocks[1], sums[n]);
-    multiply_add(left, blocks[2], blocks[3], sums[n + 1]);
-  }
-}
-
-/// Sums over the four lanes that share a row of fragments, or over the eight lanes that share a column.
-__device__ float row_sum(float x) {
-  x += __shfl_xor_sync(0xffffffffu, x, 1);
-  return x + __shfl_xor_sync(0xffffffffu, x, 2);
-}
-__device__ float column_sum(float x) {
-#pragma unroll
-  for (int distance = 4; distance < kWarp; distance *= 2) x += __shfl_xor_sync(0xffffffffu, x, distance);
-  return x;
-}
-
-/// Normalizes each row to mean 0 and variance 1; sets 1 / the standard deviations of the lane's two rows.
-__device__ void normalize(Sums* rows_inout, float (&inverse_deviations_out)[2]) {
-  float means[2] = {}, variances[2] = {};
-  rows_inout->each([&](int row, int, int, float& v) { means[row] += v; });
-#pragma unroll
-  for (int row = 0; row < 2; ++row) means[row] = row_sum(means[row]) / kChannels;
-  rows_inout->each([&](int row, int, int, float& v) {
-    v -= means[row];
-    variances[row] += v * v;
-  });
-#pragma unroll
-  for (int row = 0; row < 2; ++row) {
-    inverse_deviations_out[row] = rsqrtf(row_sum(variances[row]) / kChannels + kNormEpsilon);
-  }
-  rows_inout->each([&](int row, int, int, float& v) { v *= inverse_deviations_out[row]; });
-}
-
-/// Computes the gradient of rows from the gradient of their normalize() result.
-__device__ void normalize_backward(const Sums& normalized, const float (&inverse_deviations)[2], Sums* grads_inout) {
-  float means[2] = {}, product_means[2] = {};
-  grads_inout->each([&](int row, int n, int column, float& g) {
-    means[row] += g;
-    product_means[row] += g * normalized.values[n][2 * row + column];
-  });
-#pragma unroll
-  for (int row = 0; row < 2; ++row) {
-    means[row] = row_sum(means[row]) / kChannels;
-    product_means[row] = row_sum(product_means[row]) / kChannels;
-  }
-  grads_inout->each([&](int row, int n, int column, float& g) {
-    g = (g - means[row] - normalized.values[n][2 * row + column] * product_means[row]) * inverse_deviations[row];
-  });
-}
-
-/// Copies a matrix of parameters, [rows, columns] or transposed, into shared memory. Collective over all threads of the
-/// block.
-__device__ void load_weights(const float* weights, int rows, int columns, bool is_transposed, int stride, Half* out) {
-  for (int i = static_cast<int>(threadIdx.x); i < rows * columns; i += kThreads) {
-    const int row = i / columns, column = i % columns;
-    out[is_transposed ? column * stride + row : row * stride + column] = __float2bfloat16(weights[i]);
-  }
-}
-
-/// Inputs of a warp's members: numbers and features of each; missing columns are 0.
-struct Inputs {
-  alignas(16) Half rows[kTile][kInputStride];
-
-  __device__ void clear() {
-    for (int i = lane(); i < kTile * kInputStride; i += kWarp) rows[i / kInputStride][i % kInputStride] = Half{};
-  }
-  /// Loads members number(0), ..., number(count - 1) of a set, and zeros in the rows below.
-  template <typename Number>
-  __device__ void load(const SetSize& size, const float* members, int count, const Number& number) {
-    const RowSize& row_size = size.members;
-    const int row = lane() / 2, columns = static_cast<int>(row_size.columns),
-              width = static_cast<int>(row_size.width());
-    const float* const its_row = row < count ? members + number(row) * columns : nullptr;
-    for (int column = lane() % 2; column < width; column += 2) {
-      float value = 0;
-      if (its_row) {
-        value = column < columns ? its_row[column] : row_feature(row_size.features, its_row, column - columns);
-      }
-      rows[row][column] = __float2bfloat16(value);
-    }
-    __syncwarp();
-  }
-};
-
-/// First layer, in shared memory.
-struct HiddenLayer {
-  alignas(16) Half weight[kChannels][kInputStride];
-  float bias[kChannels];
-
-  __device__ void load(const SetSize& size, const SetParameters<const float>& parameters) {
-    for (int i = static_cast<int>(threadIdx.x); i < kChannels * kInputStride; i += kThreads) {
-      weight[i / kInputStride][i % kInputStride] = Half{};
-    }
-    __syncthreads();
-    load_weights(parameters.hidden_weight, kChannels, static_cast<int>(size.members.width()), /*is_transposed=*/false,
-                 kInputStride, weight[0]);
-    for (int i = static_cast<int>(threadIdx.x); i < kChannels; i += kThreads) bias[i] = parameters.hidden_bias[i];
-  }
-
-  /// Computes the input of the activation, normalized if there is a norm.
-  __device__ Sums apply(const Inputs& inputs, bool has_norm, float (&inverse_deviations_out)[2]) const {
-    Sums sums;
-#pragma unroll
-    for (int k = 0; k < kInputs; k += 16) {
-      multiply_add_rows(left_tile(inputs.rows[0], kInputStride, k), weight[0], kInputStride, k, &sums);
-    }
-    sums.each([&](int, int n, int column, float& v) { v += bias[8 * n + fragment_column() + column]; });
-    if (has_norm) normalize(&sums, inverse_deviations_out);
-    return sums;
-  }
-};
-
-/// Maximum so far in each of the columns of a lane, and its member; among equal values, the first member.
-struct Largest {
-  float values[kColumnTiles][2];
-  int members[kColumnTiles][2];
-
-  __device__ Largest() {
-#pragma unroll
-    for (int i = 0; i < 2 * kColumnTiles; ++i) {
-      values[i / 2][i % 2] = -INFINITY;
-      members[i / 2][i % 2] = SetSize::kNoMember;
-    }
-  }
-  __device__ void take(int n, int column, float value, int member) {
-    float& largest = values[n][column];
-    int& its_member = members[n][column];
-    // NaN is taken and kept, so that a failing network is detected.
-    const bool is_larger = value > largest || (value != value && largest == largest);
-    if (is_larger || (value == largest && member < its_member) || its_member == SetSize::kNoMember) {
-      largest = value;
-      its_member = member;
-    }
-  }
-  /// Reduces over the lanes that share a column.
-  __device__ void reduce() {
-#pragma unroll
-    for (int i = 0; i < 2 * kColumnTiles; ++i) {
-#pragma unroll
-      for (int distance = 4; distance < kWarp; distance *= 2) {
-        const float value = __shfl_xor_sync(0xffffffffu, values[i / 2][i % 2], distance);
-        const int member = __shfl_xor_sync(0xffffffffu, members[i / 2][i % 2], distance);
-        if (member != SetSize::kNoMember) take(i / 2, i % 2, value, member);
-      }
-    }
-  }
-};
-
-// A warp processes sets at a fixed stride.
-__global__ void __launch_bounds__(kThreads)
-    largest_embedding(SetSize size, const float* members, const int32_t* counts, SetParameters<const float> parameters,
-                      Half* out, uint8_t* which_out) {
-  __shared__ HiddenLayer hidden;
-  __shared__ alignas(16) Half weight[kChannels][kChannelStride];
-  __shared__ float bias[kChannels];
-  __shared__ Inputs all_inputs[kWarps];
-  hidden.load(size, parameters);
-  load_weights(parameters.weight, kChannels, kChannels, /*is_transposed=*/false, kChannelStride, weight[0]);
-  for (int i = static_cast<int>(threadIdx.x); i < kChannels; i += kThreads) bias[i] = parameters.bias[i];
-  Inputs& inputs = all_inputs[warp()];
-  inputs.clear();
-  __syncthreads();
-
-  for (int64_t set = blockIdx.x * int64_t{kWarps} + warp(); set < size.sets(); set += gridDim.x * int64_t{kWarps}) {
-    const int count = counts[set * size.counts_stride];
-    const float* const its_members = members + set * size.max_members * size.members.columns;
-    Largest largest;
-    for (int first = 0; first < count; first += kTile) {
-      inputs.load(size, its_members, count - first, [first](int row) { return first + row; });
-      float inverse_deviations[2];
-      Sums activations = hidden.apply(inputs, size.has_norm, inverse_deviations), embeddings;
-      activations.each([](int, int, int, float& v) { v = gelu(v); });
-#pragma unroll
-      for (int k = 0; k < kChannels / 16; ++k) {
-        multiply_add_rows(left_tile(activations, k), weight[0], kChannelStride, 16 * k, &embeddings);
-      }
-      embeddings.each([&](int row, int n, int column, float& v) {
-        const int member = first + fragment_row() + 8 * row;
-        if (member < count) largest.take(n, column, v, member);
-      });
-      __syncwarp();  // all lanes have read the inputs
-    }
-    largest.reduce();
-#pragma unroll
-    for (int n = 0; n < kColumnTiles; ++n) {
-      if (fragment_row() > 0) continue;
-      const int channel = 8 * n + fragment_column();
-      const int64_t at = set * kChannels + channel;
-      reinterpret_cast<uint32_t*>(out)[at / 2] =
-          count > 0 ? pack(largest.values[n][0] + bias[channel], largest.values[n][1] + bias[channel + 1]) : 0;
-      if (which_out) {
-        which_out[at] = static_cast<uint8_t>(largest.members[n][0]);
-        which_out[at + 1] = static_cast<uint8_t>(largest.members[n][1]);
-      }
-    }
-  }
-}
-
-/// Members of a set that have the maximum of some channel, in ascending order: each has a place in this list.
-struct Chosen {
-  uint8_t members[kChannels];
-
-  /// Finds the chosen members from the members of the lane's two channels. places_out: the places of the two channels'
-  /// members; -1 if a channel has no member. Returns the number of chosen members.
-  __device__ int find(const uint8_t (&which)[2], int max_members, int (&places_out)[2]) {
-    int count = 0;
-    places_out[0] = places_out[1] = -1;
-    for (int first = 0; first < max_members; first += 32) {
-      uint32_t bits = 0;
-#pragma unroll
-      for (int i = 0; i < 2; ++i) {
-        if (is_within(which[i], first)) bits |= 1u << (which[i] - first);
-      }
-      bits = __reduce_or_sync(0xffffffffu, bits);
-      const auto place = [&](int bit) { return count + __popc(bits & ((1u << bit) - 1)); };
-#pragma unroll
-      for (int i = 0; i < 2; ++i) {
-        if (is_within(which[i], first)) places_out[i] = place(which[i] - first);
-      }
-      if (bits >> lane() & 1) members[place(lane())] = static_cast<uint8_t>(first + lane());
-      count += __popc(bits);
-    }
-    __syncwarp();
-    return count;
-  }
-
- private:
-  __device__ static bool is_within(uint8_t which, int first) {
-    return which != SetSize::kNoMember && which >= first && which < first + 32;
-  }
-};
-
-/// Data of a warp's chosen members for the sums over rows.
-struct BackwardTile {
-  Inputs inputs;
-  alignas(16) Half activations[kTile][kChannelStride], grads[kTile][kChannelStride],
-      hidden_grads[kTile][kChannelStride];
-  Chosen chosen;
-
-  /// Writes the gradients of the embeddings of members with places [first, first + kTile): each channel belongs to one
-  /// member.
-  __device__ void scatter(int first, const int (&places)[2], const Half (&its_grads)[2]) {
-    for (int i = lane(); i < kTile * kChannelStride / 2; i += kWarp) reinterpret_cast<uint32_t*>(grads[0])[i] = 0;
-    __syncwarp();
-#pragma unroll
-    for (int i = 0; i < 2; ++i) {
-      const int row = places[i] - first;
-      if (places[i] >= 0 && row >= 0 && row < kTile) grads[row][2 * lane() + i] = its_grads[i];
-    }
-    __syncwarp();
-  }
-};
-
-__device__ void store(const Sums& sums, Half* rows) {
-#pragma unroll
-  for (int n = 0; n < kColumnTiles; ++n) {
-#pragma unroll
-    for (int row = 0; row < 2; ++row) {
-      Half* const at = rows + (fragment_row() + 8 * row) * kChannelStride + 8 * n + fragment_column();
-      *reinterpret_cast<uint32_t*>(at) = pack(sums.values[n][2 * row], sums.values[n][2 * row + 1]);
-    }
-  }
-}
-
-// A warp processes a set: it computes the chosen members, one tile at a time. Then each warp of the block adds its
-// quarter of the rows of both weights' gradients, from the tiles of all warps.
-__global__ void __launch_bounds__(kThreads)
-    largest_embedding_backward(SetSize size, const float* members, SetParameters<const float> parameters,
-                               const uint8_t* which, const Half* grad_out, SetParameters<float> sums_out) {
-  __shared__ HiddenLayer hidden;
-  __shared__ alignas(16) Half weight[kChannels][kChannelStride];  // [hidden, out]
-  __shared__ BackwardTile tiles[kWarps];
-  __shared__ int num_tiles[kWarps];
-  hidden.load(size, parameters);
-  load_weights(parameters.weight, kChannels, kChannels, /*is_transposed=*/true, kChannelStride, weight[0]);
-  BackwardTile& tile = tiles[warp()];
-  tile.inputs.clear();
-
-  float weight_sums[kColumnTiles][4] = {}, hidden_weight_sums[kInputs / 8][4] = {};
-  float hidden_bias_sums[kColumnTiles][2] = {}, bias_sums[2] = {};
-  for (int64_t first_set = blockIdx.x * int64_t{kWarps}; first_set < size.sets();
-       first_set += gridDim.x * int64_t{kWarps}) {
-    const int64_t set = first_set + warp();
-    int count = 0, places[2] = {-1, -1};
-    Half its_grads[2] = {};
-    if (set < size.sets()) {
-      const int64_t at = set * kChannels + 2 * lane();
-      const uint8_t its_which[2] = {which[at], which[at + 1]};
-      count = tile.chosen.find(its_which, static_cast<int>(size.max_members), places);
-#pragma unroll
-      for (int i = 0; i < 2; ++i) {
-        its_grads[i] = grad_out[at + i];
-        if (its_which[i] != SetSize::kNoMember) bias_sums[i] += __bfloat162float(its_grads[i]);
-      }
-    }
-    if (lane() == 0) num_tiles[warp()] = (count + kTile - 1) / kTile;
-    __syncthreads();
-    int most_tiles = 0;
-#pragma unroll
-    for (int i = 0; i < kWarps; ++i) most_tiles = max(most_tiles, num_tiles[i]);
-
-    for (int t = 0; t < most_tiles; ++t) {
-      const int first = t * kTile;
-      if (first < count) {
-        tile.inputs.load(size, members + set * size.max_members * size.members.columns, count - first,
-                         [&](int row) { return tile.chosen.members[first + row]; });
-        tile.scatter(first, places, its_grads);
-        float inverse_deviations[2];
-        const Sums before = hidden.apply(tile.inputs, size.has_norm, inverse_deviations);
-        Sums activations = before, grads;
-        activations.each([](int, int, int, float& v) { v = gelu(v); });
-        store(activations, tile.activations[0]);
-#pragma unroll
-        for (int k = 0; k < kChannels; k += 16) {
-          multiply_add_rows(left_tile(tile.grads[0], kChannelStride, k), weight[0], kChannelStride, k, &grads);
-        }
-        grads.each(
-            [&](int row, int n, int column, float& g) { g *= gelu_derivative(before.values[n][2 * row + column]); });
-        if (size.has_norm) normalize_backward(before, inverse_deviations, &grads);
-        grads.each([&](int, int n, int column, float& g) { hidden_bias_sums[n][column] += g; });
-        store(grads, tile.hidden_grads[0]);
-      }
-      __syncthreads();
-#pragma unroll 1
-      for (int i = 0; i < kWarps; ++i) {
-        if (t >= num_tiles[i]) continue;
-        const BackwardTile& its = tiles[i];
-        multiply_add_columns(transposed_left_tile(its.grads[0], kChannelStride, kTile * warp()), its.activations[0],
-                             kChannelStride, weight_sums);
-        multiply_add_columns(transposed_left_tile(its.hidden_grads[0], kChannelStride, kTile * warp()),
-                             its.inputs.rows[0], kInputStride, hidden_weight_sums);
-      }
-      __syncthreads();
-    }
-    __syncthreads();  // all threads have read the tiles
-  }
-
-  const int width = static_cast<int>(size.members.width());
-  const int64_t block = blockIdx.x;
-#pragma unroll
-  for (int i = 0; i < 4; ++i) {
-    const int row = kTile * warp() + fragment_row() + i / 2 * 8;
-#pragma unroll
-    for (int n = 0; n < kColumnTiles; ++n) {
-      const int column = 8 * n + fragment_column() + i % 2;
-      sums_out.weight[(block * kChannels + row) * kChannels + column] = weight_sums[n][i];
-      if (n < kInputs / 8 && column < width) {
-        sums_out.hidden_weight[(block * kChannels + row) * width + column] = hidden_weight_sums[n][i];
-      }
-    }
-  }
-  // Sums per warp, [warp, channel], in the memory of the tiles, which are no longer needed.
-  float* const shared = reinterpret_cast<float*>(tiles);
-  float *const hidden_bias = shared, *const bias = shared + kWarps * kChannels;
-#pragma unroll
-  for (int i = 0; i < 2; ++i) {
-    bias[warp() * kChannels + 2 * lane() + i] = bias_sums[i];
-#pragma unroll
-    for (int n = 0; n < kColumnTiles; ++n) {
-      const float sum = column_sum(hidden_bias_sums[n][i]);
-      if (fragment_row() == 0) hidden_bias[warp() * kChannels + 8 * n + fragment_column() + i] = sum;
-    }
-  }
-  __syncthreads();
-  for (int channel = static_cast<int>(threadIdx.x); channel < kChannels; channel += kThreads) {
-    float hidden_sum = 0, sum = 0;
-    for (int i = 0; i < kWarps; ++i) {
-      hidden_sum += hidden_bias[i * kChannels + channel];
-      sum += bias[i * kChannels + channel];
-    }
-    sums_out.hidden_bias[block * kChannels + channel] = hidden_sum;
-    sums_out.bias[block * kChannels + channel] = sum;
-  }
+// Calls f with an integral constant, the number of channels.
+template <typename F>
+void with_channels(int64_t channels, const F& f) {
+  static_assert(SetSize::supports(64, 64, 1, 1) && SetSize::supports(128, 128, 1, 1));
+  if (channels == 64) return f(std::integral_constant<int, 64>());
+  f(std::integral_constant<int, 128>());
 }
 
 }  // namespace
+
+int64_t set_encoder_bytes(int64_t channels) {
+  int64_t bytes = 0;
+  with_channels(channels, [&bytes](auto count) {
+    constexpr int kChannels = decltype(count)::value;
+    bytes = std::max(sizeof(set_encoder::ForwardMemory<kChannels>), sizeof(set_encoder::BackwardMemory<kChannels>));
+  });
+  return bytes;
+}
 
 void launch_largest_embedding(const SetSize& size, const float* members, const int32_t* counts,
                               const SetParameters<const float>& parameters, void* out, uint8_t* which_out,
                               cudaStream_t stream) {
   if (size.sets() == 0) return;
-  // A block loads the weights once, so there are only as many blocks as run at the same time.
-  constexpr int64_t kMaxBlocks = 132 * 4;
-  const int64_t blocks = std::min((size.sets() + kWarps - 1) / kWarps, kMaxBlocks);
-  largest_embedding<<<static_cast<unsigned>(blocks), kThreads, 0, stream>>>(size, members, counts, parameters,
-                                                                            static_cast<Half*>(out), which_out);
+  with_channels(size.channels, [&](auto channels) {
+    constexpr int kChannels = decltype(channels)::value, kWarps = set_encoder::kWarps<kChannels>;
+    // A block loads the weights once, so there are only as many blocks as run at the same time.
+    constexpr int64_t kMaxBlocks = 132 * 16 / kWarps;
+    launch<set_encoder::ForwardMemory<kChannels>, kChannels>(
+        set_encoder::largest_embedding<kChannels>, std::min((size.sets() + kWarps - 1) / kWarps, kMaxBlocks), stream,
+        size, members, counts, parameters, static_cast<Half*>(out), which_out);
+  });
 }
 
 void launch_largest_embedding_backward(const SetSize& size, const float* members,
                                        const SetParameters<const float>& parameters, const uint8_t* which,
                                        const void* grad_out, const SetParameters<float>& sums_out,
                                        cudaStream_t stream) {
-  largest_embedding_backward<<<SetSize::kSums, kThreads, 0, stream>>>(size, members, parameters, which,
-                                                                      static_cast<const Half*>(grad_out), sums_out);
+  with_channels(size.channels, [&](auto channels) {
+    constexpr int kChannels = decltype(channels)::value;
+    launch<set_encoder::BackwardMemory<kChannels>, kChannels>(set_encoder::largest_embedding_backward<kChannels>,
+                                                              SetSize::kSums, stream, size, members, parameters, which,
+                                                              static_cast<const Half*>(grad_out), sums_out);
+  });
 }
 
 }  // namespace pictura::cuda

@@ -78,24 +78,25 @@ PICTURA_HD inline float row_feature(const RowFeatures& features, const float* ro
 }
 
 /// Sizes for the encoder of entity sets: linear layer, normalization (if has_norm), GELU, and second linear layer, with
-/// kChannels outputs each.
+/// `channels` outputs each.
 struct SetSize {
   RowSize members;  // max_members rows per set; keeps_rows is true
   int64_t max_members = 0;
   int64_t counts_stride = 1;  // elements from one set's count to the next
   bool has_norm = false;
-  static constexpr int kChannels = 64, kMaxWidth = 32, kMaxMembers = 254, kNoMember = 255;
+  int64_t channels = 64;
+  static constexpr int kMaxWidth = 31, kMaxMembers = 254, kNoMember = 255;
   PICTURA_HD int64_t sets() const { return members.rows / max_members; }
   static constexpr bool supports(int64_t channels, int64_t hidden_channels, int64_t width, int64_t max_members) {
-    return channels == kChannels && hidden_channels == kChannels && width <= kMaxWidth && max_members >= 1 &&
-           max_members <= kMaxMembers;
+    return (channels == 64 || channels == 128) && hidden_channels == channels && width <= kMaxWidth &&
+           max_members >= 1 && max_members <= kMaxMembers;
   }
   /// Number of partial sums of each gradient.
   static constexpr int64_t kSums = 264;
 };
 
-/// Parameters of SetSize's layers, or arrays of their shapes: hidden_weight [kChannels, members.width()], weight
-/// [kChannels, kChannels], biases [kChannels].
+/// Parameters of SetSize's layers, or arrays of their shapes: hidden_weight [channels, members.width()], weight
+/// [channels, channels], biases [channels].
 template <typename Number>
 struct SetParameters {
   Number *hidden_weight, *hidden_bias, *weight, *bias;
@@ -156,8 +157,10 @@ class NetworkPasses {
 
   virtual void patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, Stream stream) = 0;
 
+  /// Whether the device has enough shared memory for the next two functions with this number of channels.
+  virtual bool fits_set_encoder(int64_t channels) const = 0;
   /// Embeds the members of entity sets in bf16, and finds each channel's largest value in a set. out: bf16 [sets,
-  /// kChannels], 0 for an empty set. which_out: [sets, kChannels], index of the first member with this value, or
+  /// channels], 0 for an empty set. which_out: [sets, channels], index of the first member with this value, or
   /// kNoMember; may be null. counts: members of each set.
   virtual void largest_embedding(const SetSize& size, const float* members, const int32_t* counts,
                                  const SetParameters<const float>& parameters, void* out, uint8_t* which_out,

@@ -169,17 +169,18 @@ at::Tensor has_clear_largest(const at::Tensor& members, const at::Tensor& counts
 
 TEST_P(DeviceLayers, LargestEmbedding) {
   const int64_t sets = 300;
-  for (const RowFeatures& features :
-       {RowFeatures{}, RowFeatures{.points = 1, .position_unit_m = kScalePosition_m},
-        RowFeatures{.points = 1, .of_segment = true, .position_unit_m = kScalePosition_m}}) {
+  const RowFeatures of_point{.points = 1, .position_unit_m = kScalePosition_m},
+      of_segment{.points = 1, .of_segment = true, .position_unit_m = kScalePosition_m};
+  for (const auto& [channels, features] :
+       {std::pair{64, RowFeatures{}}, {64, of_point}, {64, of_segment}, {128, of_segment}}) {
     for (const int64_t max_members : {1, 10, 80}) {
       for (const bool has_norm : {false, true}) {
         const at::Tensor members = numbers({sets, max_members, 7}, 1).to(at::kFloat),
                          // Empty and full sets; entries beyond a column of counts are not read.
             counts = at::arange(sets, at::kInt).remainder(max_members + 1).unsqueeze(1).repeat({1, 2}).select(1, 0);
         const int64_t width = 7 + features.count();
-        const std::vector<at::Tensor> parameters{numbers({64, width}, 1), numbers({64}, 2), 0.3 * numbers({64, 64}, 3),
-                                                 numbers({64}, 4)};
+        const std::vector<at::Tensor> parameters{numbers({channels, width}, 1), numbers({channels}, 2),
+                                                 0.3 * numbers({channels, channels}, 3), numbers({channels}, 4)};
         const auto on = [](const at::Tensor& t, const at::Tensor& where) { return t.to(where.device()); };
         // Doubles rounded to the device's type, with the gradient of the unrounded values.
         const auto rounded = [&](const at::Tensor& x) { return x.detach().to(activations()).to(at::kDouble); };
@@ -194,12 +195,11 @@ TEST_P(DeviceLayers, LargestEmbedding) {
               features.count() > 0
                   ? with_row_features(its_members.to(is_double ? at::kDouble : at::kFloat), features, type)
                   : its_members.to(type);
-          at::Tensor before = at::linear(as_held(rows), in[0]);
-          // The product's gradient is rounded too, but not the bias's: sums over sets cancel to a hundredth of their
-          // terms.
+          const at::Tensor before = at::linear(as_held(rows), in[0]) + in[1];
+          // The layer's gradient is rounded too.
           if (is_double && before.requires_grad()) before.register_hook(rounded);
-          before = before + in[1];
-          const at::Tensor hidden = gelu(has_norm ? at::layer_norm(before, {64}).to(before.scalar_type()) : before);
+          const at::Tensor hidden =
+              gelu(has_norm ? at::layer_norm(before, {channels}).to(before.scalar_type()) : before);
           return at::linear(as_held(hidden), as_held(in[2]), in[3]);
         };
         // Among members that are nearly equal, rounding decides which one the gradient reaches; their gradient is set

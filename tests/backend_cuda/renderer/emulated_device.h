@@ -222,6 +222,13 @@ Value __shfl_up_sync(unsigned, Value value, unsigned step) {
   return pictura::emulation::value_of<Value>(values[from < 0 ? lane : from]);
 }
 
+template <typename Value>
+Value __shfl_xor_sync(unsigned lanes, Value value, int mask) {
+  return __shfl_sync(lanes, value, (static_cast<int>(threadIdx.x) & 31) ^ mask);
+}
+
+inline float rsqrtf(float x) { return 1.0f / std::sqrt(x); }
+inline float __expf(float x) { return std::exp(x); }
 inline int __popc(unsigned bits) { return std::popcount(bits); }
 inline int __ffs(int bits) { return bits == 0 ? 0 : std::countr_zero(static_cast<unsigned>(bits)) + 1; }
 inline int __float_as_int(float value) { return std::bit_cast<int>(value); }
