@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 // Include this last, because it redefines CUDA's keywords.
-#include "pictura/tests/backend_cuda/renderer/emulated_device.h"
+#include "pictura/tests/backend_cuda/emulated_device.h"
 // The emulation comes before the kernels that use it.
 #include "pictura/tests/backend_cuda/learner/emulated_tensor_core.h"
 // The kernels:
@@ -87,14 +87,7 @@ double gelu_derivative(double x) {
 }
 
 void launch(int threads, unsigned blocks, const std::function<void()>& kernel) {
-  using namespace emulation;
-  grid_dim = {blocks, 1, 1};
-  block_dim = {static_cast<unsigned>(threads), 1, 1};
-  for (unsigned block = 0; block < blocks; ++block) {
-    block_index = {block, 0, 0};
-    std::memset(cuda::set_encoder::set_memory, 0xA5, sizeof(cuda::set_encoder::set_memory));
-    Block::run(threads, block, kernel);
-  }
+  emulation::launch(threads, blocks, /*seed=*/1, cuda::set_encoder::set_memory, kernel);
 }
 
 double largest_of(const std::vector<double>& numbers) {

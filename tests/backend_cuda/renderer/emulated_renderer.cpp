@@ -1,7 +1,6 @@
 #include "pictura/tests/backend_cuda/renderer/emulated_renderer.h"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "pictura/backend_cuda/renderer/draw_task.h"
@@ -9,7 +8,7 @@
 #include "pictura/common/error.h"
 #include "pictura/common/raster/check.h"
 // Include this last, because it redefines CUDA's keywords.
-#include "pictura/tests/backend_cuda/renderer/emulated_device.h"
+#include "pictura/tests/backend_cuda/emulated_device.h"
 // The kernels are renamed, because the same program contains the kernels compiled ahead of time.
 #define pictura_cull emulated_cull
 #define pictura_setup_faces emulated_setup_faces
@@ -99,15 +98,7 @@ void EmulatedRenderer::release(GeometryHandle handle, Stream) {
 
 template <typename Kernel>
 void EmulatedRenderer::launch(int threads, unsigned blocks, Kernel&& kernel) const {
-  using namespace emulation;
-  grid_dim = {blocks, 1, 1};
-  block_dim = {static_cast<unsigned>(threads), 1, 1};
-  for (unsigned block = 0; block < blocks; ++block) {
-    block_index = {block, 0, 0};
-    // Shared memory starts with arbitrary contents.
-    std::memset(cuda::block_memory, 0xA5, sizeof(cuda::block_memory));
-    Block::run(threads, seed_ + block, kernel);
-  }
+  emulation::launch(threads, blocks, seed_, cuda::block_memory, kernel);
 }
 
 void EmulatedRenderer::render(const SceneBatch& scene, const ViewBatch& views, const ImageBatch& images_out, Stream) {

@@ -1,7 +1,7 @@
 // Emulates a CUDA device on the host, to run kernels without a GPU. Threads of a block are fibers. Warps and threads
 // run in a random order, each up to its next collective operation. It is an error if lanes of a warp wait for different
-// operations. Races between two collective operations are not detected. Only one source file may include this header,
-// before the kernels.
+// operations. Races between two collective operations are not detected. Only one source file of a program may include
+// this header, before the kernels.
 #pragma once
 
 #include <algorithm>
@@ -146,6 +146,20 @@ class Block {
   ucontext_t scheduler_{};
   std::size_t running_ = 0;
 };
+
+/// Calls kernel() in each thread of `blocks` blocks, one block after another. `shared` is the shared memory, of any
+/// contents at first.
+template <std::size_t kBytes>
+void launch(int threads, unsigned blocks, uint64_t seed, unsigned char (&shared)[kBytes],
+            const std::function<void()>& kernel) {
+  grid_dim = {blocks, 1, 1};
+  block_dim = {static_cast<unsigned>(threads), 1, 1};
+  for (unsigned block = 0; block < blocks; ++block) {
+    block_index = {block, 0, 0};
+    std::memset(shared, 0xA5, kBytes);
+    Block::run(threads, seed + block, kernel);
+  }
+}
 
 template <typename Value>
 uint64_t bits_of(Value value) {
