@@ -12,6 +12,7 @@ namespace pictura {
 void add_export_command(CLI::App& app) {
   struct Arguments {
     std::string policy, out, weights = "bf16", size;
+    std::vector<int> channels;
     bool json = false, average = false;
   };
   auto arguments = std::make_shared<Arguments>();
@@ -27,6 +28,13 @@ void add_export_command(CLI::App& app) {
   command->add_option("--size", arguments->size,
                       "New image size in pixels, WxH, an integer multiple of the policy's image size; the first "
                       "convolution is spread over patches that are larger by the same factor; default: unchanged");
+  command
+      ->add_option("--channels", arguments->channels,
+                   "New channels of the convolutions, separated by commas, multiples of the policy's, the last one "
+                   "unchanged; outputs are equal until the policy learns; default: unchanged")
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber)
+      ->allow_extra_args(false);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "The file contains all data with which the policy drives: weights, configuration, cameras. simulate, evaluate, "
@@ -39,10 +47,12 @@ void add_export_command(CLI::App& app) {
       "  pictura export runs/town01/checkpoint.ckpt --weights f32 --out town01.safetensors\n"
       "  pictura export runs/town01/checkpoint.ckpt --average --out town01_average.safetensors\n"
       "  pictura export runs/demo/checkpoint.ckpt --size 96x54 --out demo_96x54.safetensors\n"
+      "  pictura export models/perspective.safetensors --channels 128,128,256,256,128 --out wide.safetensors\n"
       "  pictura simulate Town01 --policy town01.safetensors --video drive.mp4");
   command->callback([arguments] {
     ExportOptions options{.commit = PICTURA_COMMIT, .average = arguments->average};
     options.weights = arguments->weights == "bf16" ? WeightType::bf16 : WeightType::f32;
+    options.channels = arguments->channels;
     if (!arguments->size.empty()) {
       const Pair pixels = parse_pair("--size", arguments->size, 8192);
       options.size = ImageSize{pixels.first, pixels.second};

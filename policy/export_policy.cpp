@@ -8,6 +8,7 @@
 #include "pictura/configuration/apply_config.h"
 #include "pictura/policy/patch_spread.h"
 #include "pictura/policy/stored_policy.h"
+#include "pictura/policy/wider_convolutions.h"
 
 namespace pictura {
 
@@ -58,7 +59,8 @@ StoredPolicy resized_policy(const StoredPolicy& policy, ImageSize size) {
 ExportedPolicy export_policy(const std::string& policy_path, const std::string& out, const ExportOptions& options) {
   const StoredPolicy policy = read_stored_policy(policy_path, options.average);
   check_finite(policy.path, policy.parameters);
-  const StoredPolicy exported = options.size ? resized_policy(policy, *options.size) : policy;
+  StoredPolicy exported = options.size ? resized_policy(policy, *options.size) : policy;
+  if (!options.channels.empty()) exported = widened_policy(exported, options.channels);
   write_stored_policy(out, exported, options.weights, options.commit);
   const StoredPolicy written = read_stored_policy(out);
   ExportedPolicy result;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pictura/common/image.h"
 
@@ -27,11 +28,13 @@ struct ExportOptions {
   std::string commit;             // this program's commit, for the metadata
   bool average = false;           // export averaged weights, which some checkpoints contain
   std::optional<ImageSize> size;  // k times the policy's size, with an integer k
+  std::vector<int> channels;      // channels for widened_policy(); empty: unchanged
 };
 
 /// Reads a policy file, and writes it to `out` as write_policy() does. options.size also scales patches and minimum
-/// line widths (policy/patch_spread.h). Throws Error naming a file that cannot be read or written, or lacks the average
-/// that options.average selects. Throws UsageError naming `size` if the policy cannot have that size.
+/// line widths (policy/patch_spread.h); options.channels widens convolutions (policy/wider_convolutions.h). Throws
+/// Error naming a file that cannot be read or written, or lacks the average that options.average selects. Throws
+/// UsageError naming `size` or `channels` if the policy cannot have them.
 ExportedPolicy export_policy(const std::string& policy_path, const std::string& out, const ExportOptions& options);
 
 }  // namespace pictura
