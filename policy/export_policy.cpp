@@ -1,6 +1,5 @@
 #include "pictura/policy/export_policy.h"
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -18,13 +17,10 @@ namespace {
 // convolution is spread.
 StoredPolicy resized_policy(const StoredPolicy& policy, ImageSize size) {
   const Config& config = policy.config;
-  if (!config.reads_images()) fail_usage("{}: size: its policy reads no images", policy.path);
+  check_has_convolutions(policy, "size");
   if (!config.render.rig.empty()) {
     fail_usage("{}: size: its policy uses the cameras of {}, whose file gives the sizes", policy.path,
                config.render.rig);
-  }
-  if (config.policy.backbone != "conv") {
-    fail_usage("{}: size: its policy uses the program {} instead of convolutions", policy.path, config.policy.backbone);
   }
   const Camera& camera = policy.rig.cameras.at(0);
   const int factor = whole_factor({camera.width_px, camera.height_px}, size);
@@ -45,11 +41,8 @@ StoredPolicy resized_policy(const StoredPolicy& policy, ImageSize size) {
   result.config.render.height_px = size.height_px;
   result.config.render.schedule.clear();  // the schedule belongs to the run at the old size
   result.rig = paper_rig(size.width_px, size.height_px);
-  const auto first = std::find_if(result.parameters.begin(), result.parameters.end(),
-                                  [](const StoredTensor& parameter) { return parameter.name == kFirstConvolution; });
-  PICTURA_CHECK(first != result.parameters.end(), "{}: has a different architecture: no parameter '{}'", policy.path,
-                kFirstConvolution);
-  *first = spread_over_patches(*first, factor);
+  StoredTensor& first = find_parameter(&result, kFirstConvolution);
+  first = spread_over_patches(first, factor);
   if (factor > 1) result.rate_factors.try_emplace(kFirstConvolution, 1).first->second *= rate_factor_of_spread(factor);
   return result;
 }

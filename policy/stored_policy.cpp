@@ -184,13 +184,34 @@ void check_finite(const std::string& path, const std::vector<StoredTensor>& save
   }
 }
 
-const StoredTensor& find_parameter(const std::string& path, const std::vector<StoredTensor>& saved,
-                                   const std::string& name, const std::vector<int64_t>& shape) {
+void check_has_convolutions(const StoredPolicy& policy, std::string_view option) {
+  if (!policy.config.reads_images()) fail_usage("{}: {}: its policy reads no images", policy.path, option);
+  const std::string& backbone = policy.config.policy.backbone;
+  if (backbone == "conv") return;
+  fail_usage("{}: {}: its policy uses the program {} instead of convolutions", policy.path, option, backbone);
+}
+
+namespace {
+
+template <typename Tensors>
+auto& parameter_named(const std::string& path, Tensors& saved, const std::string& name) {
   const auto found = std::find_if(saved.begin(), saved.end(), [&](const StoredTensor& t) { return t.name == name; });
   PICTURA_CHECK(found != saved.end(), "{}: has a different architecture: no parameter '{}'", path, name);
-  PICTURA_CHECK(found->shape == shape, "{}: has a different architecture: parameter '{}': expected [{}], got [{}]",
-                path, name, fmt::join(shape, ", "), fmt::join(found->shape, ", "));
   return *found;
+}
+
+}  // namespace
+
+StoredTensor& find_parameter(StoredPolicy* policy, const std::string& name) {
+  return parameter_named(policy->path, policy->parameters, name);
+}
+
+const StoredTensor& find_parameter(const std::string& path, const std::vector<StoredTensor>& saved,
+                                   const std::string& name, const std::vector<int64_t>& shape) {
+  const StoredTensor& found = parameter_named(path, saved, name);
+  PICTURA_CHECK(found.shape == shape, "{}: has a different architecture: parameter '{}': expected [{}], got [{}]", path,
+                name, fmt::join(shape, ", "), fmt::join(found.shape, ", "));
+  return found;
 }
 
 void check_parameter_count(const std::string& path, size_t saved, size_t expected) {

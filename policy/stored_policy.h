@@ -52,7 +52,11 @@ void write_stored_policy(const std::string& path, const StoredPolicy& policy, We
 /// Throws Error naming file and tensor if a number is not finite; such a policy would still choose actions.
 void check_finite(const std::string& path, const std::vector<StoredTensor>& saved);
 
-/// Returns the parameter with this name. Throws Error naming file and parameter if it is missing or has another shape.
+/// Throws UsageError naming the file and `option` if the policy does not read images with convolutions.
+void check_has_convolutions(const StoredPolicy& policy, std::string_view option);
+
+/// Return the parameter with this name. Throw Error naming file and parameter if it is missing, or has another shape.
+StoredTensor& find_parameter(StoredPolicy* policy, const std::string& name);
 const StoredTensor& find_parameter(const std::string& path, const std::vector<StoredTensor>& saved,
                                    const std::string& name, const std::vector<int64_t>& shape);
 /// Throws Error naming the file if the number of parameters is not `expected`.

@@ -1,6 +1,5 @@
 #include "pictura/policy/wider_convolutions.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include <fmt/ranges.h>
@@ -61,13 +60,8 @@ bool can_widen(const std::vector<int>& from, const std::vector<int>& to) {
 }  // namespace
 
 StoredPolicy widened_policy(const StoredPolicy& policy, const std::vector<int>& channels) {
-  const Config& config = policy.config;
-  if (!config.reads_images()) fail_usage("{}: channels: its policy reads no images", policy.path);
-  if (config.policy.backbone != "conv") {
-    fail_usage("{}: channels: its policy uses the program {} instead of convolutions", policy.path,
-               config.policy.backbone);
-  }
-  const std::vector<int>& before = config.policy.conv_channels;
+  check_has_convolutions(policy, "channels");
+  const std::vector<int>& before = policy.config.policy.conv_channels;
   if (!can_widen(before, channels)) {
     fail_usage("{}: channels: expected multiples of {}, and the last one unchanged, got {}", policy.path,
                fmt::join(before, ", "), fmt::join(channels, ", "));
@@ -77,15 +71,8 @@ StoredPolicy widened_policy(const StoredPolicy& policy, const std::vector<int>& 
   int64_t in_copies = 1;
   for (size_t layer = 0; layer < channels.size(); ++layer) {
     const int64_t out_copies = channels[layer] / before[layer];
-    const auto parameter = [&](const char* kind) -> StoredTensor& {
-      const std::string name = fmt::format("conv.{}.{}", layer, kind);
-      const auto found = std::find_if(result.parameters.begin(), result.parameters.end(),
-                                      [&](const StoredTensor& each) { return each.name == name; });
-      PICTURA_CHECK(found != result.parameters.end(), "{}: has a different architecture: no parameter '{}'",
-                    policy.path, name);
-      return *found;
-    };
-    StoredTensor &weight = parameter("weight"), &bias = parameter("bias");
+    StoredTensor& weight = find_parameter(&result, fmt::format("conv.{}.weight", layer));
+    StoredTensor& bias = find_parameter(&result, fmt::format("conv.{}.bias", layer));
     weight = repeated_channels(weight, out_copies, in_copies);
     const std::vector<float> once = bias.values;
     for (int64_t copy = 1; copy < out_copies; ++copy) bias.values.insert(bias.values.end(), once.begin(), once.end());
