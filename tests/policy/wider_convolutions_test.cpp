@@ -8,6 +8,7 @@
 #include "pictura/policy/policy.h"
 #include "pictura/policy/saved_policy.h"
 #include "pictura/tests/policy/numbers.h"
+#include "pictura/tests/policy/small_policy.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/scratch_folder.h"
 
@@ -23,18 +24,12 @@ class WiderConvolutions : public ::testing::Test {
     Config c;
     c.render.width_px = 16;
     c.render.height_px = 9;
-    PolicySection& policy = c.policy;
-    policy.patch_px = 2;
-    policy.conv_channels = {8, 4, 8};
-    policy.conv_kernels = {1, 3, 3};
-    policy.conv_strides = {1, 2, 1};
-    policy.conv_norm = has_norm;
-    policy.num_queries = 2;
-    policy.attention_heads = 2;
-    policy.attention_mlp = 8;
-    policy.embedding_width = 8;
-    policy.backbone_layers = 2;
-    policy.backbone_width = 16;
+    c.policy = test::tiny_section(Modality::perspective);
+    c.policy.patch_px = 2;
+    c.policy.conv_channels = {8, 4, 8};
+    c.policy.conv_kernels = {1, 3, 3};
+    c.policy.conv_strides = {1, 2, 1};
+    c.policy.conv_norm = has_norm;
     return c;
   }
   SavedPolicy write(const Config& config) {
