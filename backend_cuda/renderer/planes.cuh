@@ -5,7 +5,7 @@
 
 namespace pictura::cuda {
 
-/// Images to which planes are written.
+/// Planes of one image, as the target of writes.
 struct PlaneWriter {
   CameraPlanes planes;
   int width_px;
@@ -40,10 +40,10 @@ __device__ void link_rows(const Memory& memory, const Part& part) {
       const SharedRow its = SharedRow::of<Memory>(owner, row, span, part);
       if (owner < 0) return;
       const int column = its.span.begin() + k;
-      const bool is_full = column >= its.span.full_begin() && column < its.span.full_end();
+      const bool is_full = its.span.row().is_full(column);
       Word* const pixel = &memory.pixels[part.pixel(part.x_begin + column, its.y)];
-      // A thread that finds another face's word marks the pixel after its exchange, so the last thread's word remains
-      // only where it is the first.
+      // If several faces touch a pixel, all threads but the first find a word, and mark the pixel after their exchange.
+      // So the word of a face remains only where no other face touches the pixel.
       const Word before = atomicExch(pixel, is_full ? static_cast<Word>(its.face + 1) : kSearchedPixel<Memory>);
       if (before != 0) atomicOr(pixel, kSearchedPixel<Memory>);
     });

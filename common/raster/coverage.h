@@ -138,6 +138,7 @@ PICTURA_HD inline PixelCoverage pixel_coverage(const PolygonEdge* edges, int cou
 /// Pixels of a row that a polygon may touch, and pixels that it covers fully.
 struct RowSpan {
   int32_t begin = 0, end = 0, full_begin = 0, full_end = 0;
+  PICTURA_HD bool is_full(int32_t column) const { return column >= full_begin && column < full_end; }
 };
 
 /// Margin at the ends of spans, within which pixel_coverage() decides.
@@ -185,8 +186,7 @@ PICTURA_HD inline RowSpan row_span(const PolygonEdge* edges, int count, const Pi
 PICTURA_HD inline bool covers_center(const PolygonEdge* edges, int count, const RowSpan& span, int column,
                                      Vec2 center_px) {
   if (column < span.begin || column >= span.end) return false;
-  const bool is_full = column >= span.full_begin && column < span.full_end;
-  return is_full || covers_point(edges, count, center_px.x, center_px.y);
+  return span.is_full(column) || covers_point(edges, count, center_px.x, center_px.y);
 }
 
 }  // namespace pictura
