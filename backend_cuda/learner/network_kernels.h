@@ -21,7 +21,7 @@ void launch_norm_backward(const ActivationSize& size, const void* x, const void*
                           cudaStream_t stream);
 void launch_row_features(const RowSize& size, const float* rows, ActivationType type, void* out, cudaStream_t stream);
 void launch_patches(const PatchSize& size, const uint8_t* images, ActivationType type, void* out, cudaStream_t stream);
-/// Returns the shared memory of a block of the next two kernels, in bytes.
+/// Returns the shared memory that a block of each of the next two kernels needs at most, in bytes.
 int64_t set_encoder_bytes(int64_t channels);
 void launch_largest_embedding(const SetSize& size, const float* members, const int32_t* counts,
                               const SetParameters<const float>& parameters, void* out, uint8_t* which_out,

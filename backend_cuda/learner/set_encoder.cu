@@ -11,12 +11,11 @@ namespace pictura::cuda {
 namespace {
 
 // Launches a kernel with an object of type Memory in shared memory.
-template <typename Memory, int kChannels, typename... Parameters, typename... Arguments>
+template <typename Memory, typename... Parameters, typename... Arguments>
 void launch(void (*kernel)(Parameters...), int64_t blocks, cudaStream_t stream, const Arguments&... arguments) {
   cudaFuncSetAttribute(reinterpret_cast<const void*>(kernel), cudaFuncAttributeMaxDynamicSharedMemorySize,
                        sizeof(Memory));
-  kernel<<<static_cast<unsigned>(blocks), set_encoder::kWarps<kChannels> * kWarp, sizeof(Memory), stream>>>(
-      arguments...);
+  kernel<<<static_cast<unsigned>(blocks), Memory::kThreads, sizeof(Memory), stream>>>(arguments...);
 }
 
 // Calls f with an integral constant, the number of channels.
@@ -46,7 +45,7 @@ void launch_largest_embedding(const SetSize& size, const float* members, const i
     constexpr int kChannels = decltype(channels)::value, kWarps = set_encoder::kWarps<kChannels>;
     // A block loads the weights once, so there are only as many blocks as run at the same time.
     constexpr int64_t kMaxBlocks = 132 * 16 / kWarps;
-    launch<set_encoder::ForwardMemory<kChannels>, kChannels>(
+    launch<set_encoder::ForwardMemory<kChannels>>(
         set_encoder::largest_embedding<kChannels>, std::min((size.sets() + kWarps - 1) / kWarps, kMaxBlocks), stream,
         size, members, counts, parameters, static_cast<Half*>(out), which_out);
   });
@@ -58,9 +57,9 @@ void launch_largest_embedding_backward(const SetSize& size, const float* members
                                        cudaStream_t stream) {
   with_channels(size.channels, [&](auto channels) {
     constexpr int kChannels = decltype(channels)::value;
-    launch<set_encoder::BackwardMemory<kChannels>, kChannels>(set_encoder::largest_embedding_backward<kChannels>,
-                                                              SetSize::kSums, stream, size, members, parameters, which,
-                                                              static_cast<const Half*>(grad_out), sums_out);
+    launch<set_encoder::BackwardMemory<kChannels>>(set_encoder::largest_embedding_backward<kChannels>, SetSize::kSums,
+                                                   stream, size, members, parameters, which,
+                                                   static_cast<const Half*>(grad_out), sums_out);
   });
 }
 

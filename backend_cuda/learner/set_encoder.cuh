@@ -246,6 +246,7 @@ struct Largest {
 /// Shared memory of largest_embedding().
 template <int kChannels>
 struct ForwardMemory {
+  static constexpr int kThreads = kWarps<kChannels> * kWarp;
   HiddenLayer<kChannels> hidden;
   alignas(16) Half weight[kChannels][kChannelStride<kChannels>];
   float bias[kChannels];
@@ -254,7 +255,7 @@ struct ForwardMemory {
 
 // A warp processes sets at a fixed stride.
 template <int kChannels>
-__global__ void __launch_bounds__(kWarps<kChannels>* kWarp)
+__global__ void __launch_bounds__(ForwardMemory<kChannels>::kThreads)
     largest_embedding(SetSize size, const float* members, const int32_t* counts, SetParameters<const float> parameters,
                       Half* out, uint8_t* which_out) {
   constexpr int kStride = kChannelStride<kChannels>, kColumnTiles = kChannels / 8;
@@ -392,6 +393,7 @@ __device__ void store(const Sums<kChannels>& sums, const F& f, Half* rows) {
 /// Shared memory of largest_embedding_backward().
 template <int kChannels>
 struct BackwardMemory {
+  static constexpr int kThreads = kWarps<kChannels> * kWarp;
   HiddenLayer<kChannels> hidden;
   alignas(16) Half weight[kChannels][kChannelStride<kChannels>];  // [hidden, out]
   BackwardTile<kChannels> tiles[kWarps<kChannels>];
@@ -401,7 +403,7 @@ struct BackwardMemory {
 // A warp processes a set: it computes the chosen members, one tile at a time. Then each warp of the block adds its tile
 // of the rows of both weights' gradients, from the tiles of all warps.
 template <int kChannels>
-__global__ void __launch_bounds__(kWarps<kChannels>* kWarp)
+__global__ void __launch_bounds__(BackwardMemory<kChannels>::kThreads)
     largest_embedding_backward(SetSize size, const float* members, SetParameters<const float> parameters,
                                const uint8_t* which, const Half* grad_out, SetParameters<float> sums_out) {
   constexpr int kStride = kChannelStride<kChannels>, kColumnTiles = kChannels / 8, kOfLane = Chosen<kChannels>::kOfLane,
