@@ -28,7 +28,7 @@ at::Tensor convolve_norm_gelu(const at::Tensor& x, const at::Tensor& weight, con
 at::Tensor norm(const at::Tensor& x, const at::Tensor& position, const at::Tensor& weight, const at::Tensor& bias);
 
 /// Whether largest_embedding() supports the arguments: always on the host. A CUDA device needs f32 members, bf16
-/// layers, and sizes that SetSize supports.
+/// layers, and sizes that SetSize and its shared memory support.
 bool has_fused_set_encoder(const at::Tensor& members, const RowFeatures& features, const at::Tensor& hidden_weight,
                            const at::Tensor& weight);
 /// Embeds the members of entity sets, and returns each channel's largest value in a set: [sets, channels], 0 for an
