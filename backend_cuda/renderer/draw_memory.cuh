@@ -42,16 +42,15 @@ struct DrawMemory {
   Word* rows;                // [max_rows] rows of faces: face in the upper half, row of the part in the lower half
   Word* candidates;          // [max_candidates] possible fragments: face in the upper half, pixel in the lower half
   // Arrays for planes, which share memory with arrays of fragments and candidates:
-  uint32_t* spans;   // [max_rows] columns of each row of a face, see TileSpan
-  Word* links;       // [max_rows] next row of a face in the same row of the part, plus 1; 0 ends a list
-  Word* first_rows;  // [rows of the part] first row of a face in this row, plus 1
+  Index* layer_face;  // [max_layers] face that covers the centre of a pixel
+  Index* layer_next;  // [max_layers] next layer in the pixel's list, plus 1; 0 ends a list
   // Arrays of fragments:
   uint32_t *samples_low, *samples_high, *visible_low, *visible_high;  // [max_fragments]
   float* area;                                                        // [max_fragments]
   Index *face, *pixel, *next;  // [max_fragments] next: next fragment in the pixel's list, or kNone
   Index* kind;                 // [max_fragments] kind of the weight; shares memory with `pixel`
   Index* composited;           // [max_fragments] pixels to be composited
-  int32_t max_pixels, max_rows, max_candidates, max_fragments;
+  int32_t max_pixels, max_rows, max_candidates, max_fragments, max_layers;
 
   __device__ uint64_t samples(int fragment) const {
     return static_cast<uint64_t>(samples_high[fragment]) << 32 | samples_low[fragment];
@@ -96,15 +95,16 @@ struct Layout {
   }
 };
 
-// Places the arrays from `bytes` on, and returns their size in bytes. Rows share memory with samples. Candidates, links
-// and first rows share memory with visible samples and `composited`; spans share memory with the arrays from `area` to
-// `next`.
+// Places the arrays from `bytes` on, and returns their size in bytes. Rows share memory with samples. Candidates and
+// `layer_next` share memory with visible samples and `composited`; `layer_face` shares memory with the arrays from
+// `area` to `next`.
 template <typename Memory>
 __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragments, unsigned char* bytes) {
   memory->max_pixels = max_pixels;
   memory->max_fragments = max_fragments;
   Layout layout{bytes};
   layout.place(&memory->pixels, max_pixels);
+  const size_t fragments_begin = layout.used;
   layout.place(&memory->area, max_fragments);
   layout.place(&memory->face, max_fragments);
   layout.place(&memory->pixel, max_fragments);
@@ -118,12 +118,14 @@ __host__ __device__ size_t lay_out(Memory* memory, int max_pixels, int max_fragm
   layout.place(&memory->composited, max_fragments);
   memory->kind = memory->pixel;
   using Word = typename Memory::Word;
+  using Index = typename Memory::Index;
   memory->rows = reinterpret_cast<Word*>(bytes + rows_begin);
   memory->max_rows = static_cast<int32_t>((candidates_begin - rows_begin) / sizeof(Word));
   memory->candidates = reinterpret_cast<Word*>(bytes + candidates_begin);
-  memory->spans = reinterpret_cast<uint32_t*>(memory->area);
-  memory->links = memory->candidates;
-  memory->first_rows = memory->links + memory->max_rows;
+  memory->layer_face = reinterpret_cast<Index*>(memory->area);
+  memory->layer_next = reinterpret_cast<Index*>(memory->candidates);
+  memory->max_layers = min_of(static_cast<int32_t>((rows_begin - fragments_begin) / sizeof(Index)),
+                              static_cast<int32_t>((layout.used - candidates_begin) / sizeof(Index)));
   // Most candidates become fragments. The fragments of a longer list would thus exceed max_fragments.
   memory->max_candidates = max_fragments + max_fragments / 2;
   return layout.used;
@@ -151,8 +153,6 @@ struct SmallDrawMemory : DrawMemory<uint16_t, uint32_t, kDrawThreads> {
 };
 static_assert(kMaxEntries <= kMaxMarkedFaces);
 static_assert(kMaxMarkedFaces < 0xFFFF && kDrawFragments < 0xFFFF && kDrawPixels < 0x7FFF);
-// After the links, first rows have the space of half as many words as there are fragments.
-static_assert(kTileHeight_px <= kDrawFragments / 2 && kLargePixels / kTileWidth_px <= kLargeFragments / 2);
 
 // Global memory that holds the lists of face set-up, and later the arrays for drawing.
 __host__ __device__ inline size_t lay_out(SetupLists* lists, const Scratch& sizes, unsigned char* bytes) {

@@ -144,7 +144,7 @@ struct SharedRow {
   }
 };
 
-// Calls visit(index, row, span) for the listed rows of faces, with a row per lane; lanes without a row get an empty
+// Calls visit(row, span) for the listed rows of faces, with a row per lane; lanes without a row get an empty
 // span. The lanes of a warp take distant rows, because neighbouring rows often belong to one large face. Collective
 // over the block.
 template <typename Memory, typename Visit>
@@ -162,7 +162,7 @@ __device__ void for_each_row(const Memory& memory, const Part& part, const Visit
       const int y = part.y_begin + static_cast<int>(row & Memory::kNone);
       span = TileSpan(row_span(memory.edges + face.edge_begin, face.edge_count, face.box, y), part);
     }
-    visit(at, row, span);
+    visit(row, span);
   }
 }
 
@@ -172,7 +172,7 @@ __device__ void mark_and_list(const Memory& memory, const Part& part) {
   using Word = typename Memory::Word;
   BlockState* state = memory.state;
   WarpState* warp = &state->warps[warp_index()];
-  for_each_row(memory, part, [&](int, Word row, TileSpan span) {
+  for_each_row(memory, part, [&](Word row, TileSpan span) {
     const int full = span.num_full(), partial = span.end() - span.begin() - full;
     // Both prefix sums in one word: neither reaches 2^16.
     const int ends = warp_inclusive_sum(full | partial << 16), full_end = ends & 0xFFFF, partial_end = ends >> 16;

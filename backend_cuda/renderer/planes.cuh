@@ -20,59 +20,52 @@ struct PlaneWriter {
   }
 };
 
-/// Word of a pixel whose front face must be searched. Other pixels have 0, or 1 plus the index of the only face that
-/// touches them, and covers them fully.
+// Lists the layers of all pixels: the faces that cover their centres. The word of a pixel, which must be 0, becomes the
+// first layer plus 1. num_candidates counts the layers; those beyond max_layers are not stored. Collective over the
+// block.
 template <typename Memory>
-constexpr typename Memory::Word kSearchedPixel = ~typename Memory::Word{0};
-
-// Lists each row's faces, and sets the words of all pixels, which must be 0. Collective over the block.
-template <typename Memory>
-__device__ void link_rows(const Memory& memory, const Part& part) {
+__device__ void list_layers(const Memory& memory, const Part& part) {
+  using Index = typename Memory::Index;
   using Word = typename Memory::Word;
   WarpState* warp = &memory.state->warps[warp_index()];
-  for_each_row(memory, part, [&](int at, Word row, TileSpan span) {
-    const int count = span.end() - span.begin();
-    if (count > 0) {
-      memory.spans[at] = span.bytes;
-      memory.links[at] = atomicExch(&memory.first_rows[row & Memory::kNone], static_cast<Word>(at + 1));
-    }
-    warp_expand(warp, count, warp_inclusive_sum(count), [&](int, int owner, int k) {
+  for_each_row(memory, part, [&](Word row, TileSpan span) {
+    const int columns = span.end() - span.begin();
+    warp_expand(warp, columns, warp_inclusive_sum(columns), [&](int, int owner, int k) {
       const SharedRow its = SharedRow::of<Memory>(owner, row, span, part);
-      if (owner < 0) return;
-      const int column = its.span.begin() + k;
-      const bool is_full = its.span.row().is_full(column);
-      Word* const pixel = &memory.pixels[part.pixel(part.x_begin + column, its.y)];
-      // If several faces touch a pixel, all threads but the first find a word, and mark the pixel after their exchange.
-      // So the word of a face remains only where no other face touches the pixel.
-      const Word before = atomicExch(pixel, is_full ? static_cast<Word>(its.face + 1) : kSearchedPixel<Memory>);
-      if (before != 0) atomicOr(pixel, kSearchedPixel<Memory>);
+      const int column = its.span.begin() + k, x = part.x_begin + column;
+      bool covers = false;
+      if (owner >= 0) {
+        const ScreenFace& face = memory.faces[its.face];
+        covers = covers_center(memory.edges + face.edge_begin, face.edge_count, its.span.row(), column,
+                               pixel_center(x, its.y));
+      }
+      const int32_t layer = warp_allocate_one(&memory.state->num_candidates, covers);
+      if (!covers || layer >= memory.max_layers) return;
+      memory.layer_face[layer] = static_cast<Index>(its.face);
+      memory.layer_next[layer] =
+          static_cast<Index>(atomicExch(&memory.pixels[part.pixel(x, its.y)], static_cast<Word>(layer + 1)));
     });
   });
 }
 
-// Finds the front face at a pixel's centre; null if there is none. are_linked: whether all rows of faces fit into
-// memory.
+// Finds the front face at a pixel's centre; null if there is none. are_listed: whether all layers fit into memory.
+// first: the pixel's first layer plus 1.
 template <typename Memory>
-__device__ __noinline__ const ScreenFace* find_front(int num_faces, bool are_linked, int x, int y, Part part) {
-  using Word = typename Memory::Word;
+__device__ __noinline__ const ScreenFace* find_front(int num_faces, bool are_listed, uint32_t first, int x, int y) {
   const Memory memory = Memory::current();
   const Vec2 center = pixel_center(x, y);
   auto each = [&](auto&& take) {
-    auto ask = [&](const ScreenFace& face, const RowSpan& span, int column) {
-      if (covers_center(memory.edges + face.edge_begin, face.edge_count, span, column, center)) take(face);
-    };
-    if (are_linked) {
-      PICTURA_NO_UNROLL
-      for (Word at = memory.first_rows[y - part.y_begin]; at != 0; at = memory.links[at - 1]) {
-        ask(memory.faces[memory.rows[at - 1] >> Memory::kHalf], TileSpan(memory.spans[at - 1]).row(), x - part.x_begin);
-      }
-      return;
+    PICTURA_NO_UNROLL
+    for (uint32_t layer = first; are_listed && layer != 0; layer = memory.layer_next[layer - 1]) {
+      take(memory.faces[memory.layer_face[layer - 1]]);
     }
     PICTURA_NO_UNROLL
-    for (int i = 0; i < num_faces; ++i) {
+    for (int i = 0; !are_listed && i < num_faces; ++i) {
       const ScreenFace& face = memory.faces[i];
       if (y < face.box.y_begin || y >= face.box.y_end) continue;
-      ask(face, row_span(memory.edges + face.edge_begin, face.edge_count, face.box, y), x);
+      const PolygonEdge* const edges = memory.edges + face.edge_begin;
+      const RowSpan span = row_span(edges, face.edge_count, face.box, y);
+      if (covers_center(edges, face.edge_count, span, x, center)) take(face);
     }
   };
   FrontFace front;
@@ -88,30 +81,33 @@ __device__ __noinline__ void draw_planes(PlaneWriter writer, int num_faces, Part
   const Memory memory = Memory::current();
   sync_block();
   list_rows(memory, num_faces, part);
-  for (int i = static_cast<int>(threadIdx.x); i < part.num_rows(); i += Memory::kThreads) memory.first_rows[i] = 0;
   sync_block();
-  const bool are_linked = memory.state->num_rows <= memory.max_rows;
-  if (are_linked) link_rows(memory, part);
+  const bool fit_rows = memory.state->num_rows <= memory.max_rows;
+  if (fit_rows) list_layers(memory, part);
   sync_block();
-  // Pixels that must be searched are queued until every lane of the warp has one.
+  const bool are_listed = fit_rows && memory.state->num_candidates <= memory.max_layers;
+  // Pixels with several layers are queued until every lane of the warp has one.
   WarpQueue queue(&memory.state->warps[warp_index()].queue);
   const int num_pixels = part.num_pixels();
   PICTURA_NO_UNROLL
-  for (int first = warp_index() * kWarpSize;; first += Memory::kThreads) {
-    const int p = first + lane_index();
-    const bool more = first < num_pixels;
+  for (int begin = warp_index() * kWarpSize;; begin += Memory::kThreads) {
+    const int p = begin + lane_index();
+    const bool more = begin < num_pixels;
     bool is_searched = false;
+    Word first = 0;
     if (p < num_pixels && part.x_of(p) < part.x_end) {
-      const Word word = are_linked ? memory.pixels[p] : kSearchedPixel<Memory>;
-      is_searched = word == kSearchedPixel<Memory>;
-      if (!is_searched) writer.write(part.x_of(p), part.y_of(p), word == 0 ? nullptr : memory.faces + (word - 1));
+      first = memory.pixels[p];
+      is_searched = !are_listed || (first != 0 && memory.layer_next[first - 1] != 0);
+      if (!is_searched) {
+        writer.write(part.x_of(p), part.y_of(p), first == 0 ? nullptr : memory.faces + memory.layer_face[first - 1]);
+      }
     }
-    queue.push(is_searched, static_cast<uint32_t>(p), 0);
+    queue.push(is_searched, static_cast<uint32_t>(p), static_cast<uint32_t>(first));
     if (queue.is_ready() || (!more && !queue.is_empty())) {
       const WarpQueue::Pair pair = queue.take();
       if (pair.is_valid) {
-        const int x = part.x_of(static_cast<int>(pair.a)), y = part.y_of(static_cast<int>(pair.a));
-        writer.write(x, y, find_front<Memory>(num_faces, are_linked, x, y, part));
+        const int pixel = static_cast<int>(pair.a), x = part.x_of(pixel), y = part.y_of(pixel);
+        writer.write(x, y, find_front<Memory>(num_faces, are_listed, pair.b, x, y));
       }
     }
     if (!more && queue.is_empty()) break;
