@@ -3,21 +3,21 @@
 
 #include <ATen/ATen.h>
 
-#include "pictura/simulator/controllers/controller.h"
+#include "pictura/policy/rules/policy_executor.h"
 
 namespace pictura {
 
-/// Clock of one simulator. Agents decide at steps divisible by policy.decision_steps. An agent also decides in its
-/// first step after a reset, the start of a life, or inactivity.
+/// Clock of one simulator. Agents decide at steps divisible by policy.decision_steps, and whenever they do not hold
+/// their action (HeldActions).
 class DecisionClock {
  public:
   explicit DecisionClock(int64_t decision_steps) : decision_steps_(decision_steps) {}
 
   /// Returns the `active` slots (i64 [n], ascending) that decide at `step`. Call it once before each step. All agents
   /// of worlds with a nonzero episode_over (u8 [worlds], or empty) decide, because learning needs their last value.
-  /// Agents that just left at the end of a road also decide. On a device, waits unless all agents decide.
+  /// On a device, waits unless all agents decide.
   at::Tensor select_deciding(const SimulatorArrays& input, const at::Tensor& active, int64_t step,
-                             Span<const uint8_t> episode_over = {});
+                             Span<const uint8_t> episode_over, PolicyExecutor* executor);
 
  private:
   const int64_t decision_steps_;

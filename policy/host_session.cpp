@@ -186,18 +186,15 @@ class HostController final : public PolicyController {
   int64_t num_driven() const override { return num_driven_; }
 
  private:
-  // Removes the slots of agents that hold their action, by the rule of DecisionClock::select_deciding().
+  // Removes the slots of agents that hold their action, as DecisionClock does.
   void keep_deciding(const SimulatorArrays& input, std::vector<int64_t>* slots_inout) {
     const int64_t decision_steps = session_.config.policy.decision_steps, step = step_++;
     if (decision_steps == 1) return;
     const std::vector<uint8_t> acted_before = std::exchange(acted_, std::vector<uint8_t>(actions_.size()));
     for (const int64_t slot : *slots_inout) acted_[slot] = 1;
     if (step % decision_steps == 0 || acted_before.size() != acted_.size()) return;
-    std::erase_if(*slots_inout, [&](int64_t slot) {
-      const auto world = static_cast<size_t>(input.slots.world_of_slot[slot]);
-      const bool begins = input.episode_step[world] == input.state.life_step[slot];
-      return acted_before[slot] && !begins && !input.state.left[slot];
-    });
+    const HeldActions held(input, acted_before.data(), nullptr);
+    std::erase_if(*slots_inout, [&](int64_t slot) { return held.holds(slot); });
   }
 
   const HostSession& session_;

@@ -126,12 +126,15 @@ std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> vi
   return blocks;
 }
 
-at::Tensor active_slots(const SimulatorArrays& input, Span<const uint8_t> mask, bool with_left,
-                        PolicyExecutor* executor) {
+at::Tensor deciding_slots(const SimulatorArrays& input, const DecidingSlots& asked, PolicyExecutor* executor) {
   const auto num_slots = static_cast<int64_t>(input.slots.world_of_slot.size());
   const at::Tensor slots = at::empty({num_slots}, at::TensorOptions(at::kLong).device(torch_device(input.device)));
-  const DecidingSlots asked{input.state.status, mask, with_left ? input.state.left : nullptr};
   return slots.narrow(0, 0, executor->select_deciding(asked, span_of<int64_t>(slots), current_stream(input.device)));
+}
+
+at::Tensor active_slots(const SimulatorArrays& input, Span<const uint8_t> mask, bool with_left,
+                        PolicyExecutor* executor) {
+  return deciding_slots(input, {input.state.status, mask, with_left ? input.state.left : nullptr}, executor);
 }
 
 constexpr auto kViewBytes = static_cast<int64_t>(sizeof(View));

@@ -84,6 +84,8 @@ std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> bat
 std::vector<ImageBlock> draw_images(const SceneBatch& scene, Span<const View> views, Renderer* renderer,
                                     int patch_px = 0);
 
+/// Returns the slots for which asked(slot) is true, i64 [n], ascending.
+at::Tensor deciding_slots(const SimulatorArrays& input, const DecidingSlots& asked, PolicyExecutor* executor);
 /// Returns the active agents' slots, i64 [n], ascending. A nonempty mask [slots] excludes slots with 0. `with_left`
 /// adds agents that left at the end of a road in the last step, because learning needs their last value.
 at::Tensor active_slots(const SimulatorArrays& input, Span<const uint8_t> mask, bool with_left,

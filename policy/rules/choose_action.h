@@ -76,15 +76,41 @@ PICTURA_HD inline void write_command(const int32_t* actions, Span<const uint8_t>
   commands_out[slot].action = actions[slot];
 }
 
+/// Test whether an agent holds its action between the policy's decisions. It does not in its first step after a reset,
+/// the start of a life, or inactivity, nor after it left the map.
+struct HeldActions {
+  const uint8_t* acted_before = nullptr;  // [slots] whether active at the previous step; null: no agent holds
+  const int32_t *world_of_slot = nullptr, *life_step = nullptr;  // [slots]
+  const uint8_t* left = nullptr;                                 // [slots]
+  const int32_t* episode_step = nullptr;                         // [worlds]
+  const uint8_t* episode_over = nullptr;                         // [worlds] 1: no agent holds; or null
+
+  HeldActions() = default;
+  HeldActions(const SimulatorArrays& input, const uint8_t* its_acted_before, const uint8_t* its_episode_over)
+      : acted_before(its_acted_before),
+        world_of_slot(input.slots.world_of_slot.data()),
+        life_step(input.state.life_step),
+        left(input.state.left),
+        episode_step(input.episode_step.data()),
+        episode_over(its_episode_over) {}
+
+  PICTURA_HD bool holds(int64_t slot) const {
+    if (acted_before == nullptr || !acted_before[slot] || left[slot]) return false;
+    const int32_t world = world_of_slot[slot];
+    return episode_step[world] != life_step[slot] && (episode_over == nullptr || !episode_over[world]);
+  }
+};
+
 /// Test whether the policy is evaluated for a slot.
 struct DecidingSlots {
   const AgentStatus* status;
   Span<const uint8_t> mask;  // [slots] 0: excluded; empty: no slot is excluded
   const uint8_t* left;       // [slots] 1: just left the map, and is included; or null
+  HeldActions held{};
 
   PICTURA_HD bool operator()(int64_t slot) const {
     const bool is_asked = takes_actions(status[slot]) || (left != nullptr && left[slot] != 0);
-    return is_asked && (mask.empty() || mask[slot]);
+    return is_asked && (mask.empty() || mask[slot]) && !held.holds(slot);
   }
 };
 

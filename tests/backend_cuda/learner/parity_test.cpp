@@ -180,6 +180,33 @@ TEST_F(CudaLearnerTest, SelectsActiveSlotsInTheMask) {
   EXPECT_EQ(same_active(worlds, executors, {}).size(), 0u);
 }
 
+TEST_F(CudaLearnerTest, SelectsSlotsThatHoldNoAction) {
+  std::mt19937_64 random(6);
+  const Executors executors;
+  Worlds worlds(short_episodes());
+  size_t held = 0;
+  for (const uint32_t steps : {1u, 13u, 20u, 21u}) {
+    SCOPED_TRACE(steps);
+    worlds.drive_to(steps);
+    const std::vector<uint8_t> acted_before = random_flags(kSlots, 0.7, &random);
+    const DeviceBuffer<uint8_t> copy = on_device(acted_before);
+    const size_t active = same_active(worlds, executors, {}).size();
+    for (const bool all_at_the_end : {false, true}) {
+      const auto select = [&](LearnerExecutor* executor, Span<int64_t> slots, bool on_device) {
+        const Simulator& simulator = on_device ? *worlds.cuda : *worlds.cpu;
+        const SimulatorArrays input = simulator.arrays();
+        const HeldActions actions(input, on_device ? copy.data() : acted_before.data(),
+                                  all_at_the_end ? simulator.episode_over().data() : nullptr);
+        return executor->select_deciding({input.state.status, {}, nullptr, actions}, slots);
+      };
+      const size_t deciding = same_selection(kSlots, executors, select).size();
+      EXPECT_LE(deciding, active);
+      held += active - deciding;
+    }
+  }
+  EXPECT_GT(held, 0u);
+}
+
 TEST_F(CudaLearnerTest, ChoosesActionsOfSelectedSlots) {
   constexpr int32_t kUntouched = -7;
   std::mt19937_64 random(2);
