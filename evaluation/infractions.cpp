@@ -182,13 +182,13 @@ struct InfractionObserver::WorldStep {
     }
   }
 
-  // Returns the red light whose stop line is nearest to the agent's front bumper; -1: no light is red.
+  // Returns the light, red during the step, whose stop line is nearest to the agent's front bumper; -1: none was red.
   int32_t nearest_red_light(size_t agent) const {
     const Vec2 bumper = front_bumper(before.boxes[first_box + agent]);
     float least_m = std::numeric_limits<float>::infinity();
     int32_t nearest = -1;
     for (size_t i = 0; i < stop_lines.size(); ++i) {
-      if (!after.is_red(first_light + i)) continue;
+      if (!before.is_red(first_light + i)) continue;
       const float apart_m = length(stop_lines[i].middle_m.xy() - bumper);
       if (apart_m >= least_m) continue;
       least_m = apart_m;
@@ -257,8 +257,7 @@ Infraction InfractionObserver::describe(const WorldStep& step, size_t agent) con
   const int32_t light = step.nearest_red_light(agent);
   if (light < 0) return one;
   const int since = red_since_step_[step.first_light + static_cast<size_t>(light)];
-  one.red_for_s = since > 0 ? static_cast<float>(step_ - since) * dt_s
-                            : (since < 0 ? 0.0f : std::numeric_limits<float>::infinity());
+  one.red_for_s = since > 0 ? static_cast<float>(step_ - since) * dt_s : std::numeric_limits<float>::infinity();
   const Vec3 head_m = step.heads[light].position_m;
   one.stop_line_to_head_m = length((head_m - step.stop_lines[light].middle_m).xy());
   return one;

@@ -212,5 +212,38 @@ TEST(Infractions, ObservedInfractionsEqualTheCountsOfTheEvaluation) {
   EXPECT_THAT(text, HasSubstr("\"procedural:1\""));
 }
 
+/// Accelerates all agents, who do not steer.
+class StraightOn final : public Controller {
+ public:
+  std::string_view name() const override { return "straight on"; }
+  void act(const SimulatorArrays& /*input*/, Span<const uint8_t> /*mask*/, Span<Command> commands_out,
+           Stream /*stream*/) override {
+    for (Command& command : commands_out) command = {.action = 3 * kNumLatActions + 1};
+  }
+};
+
+TEST(Infractions, DescribeALightThatWasRedWhenItsLineWasCrossed) {
+  InfractionObserver observer;
+  EvaluateOptions options;
+  options.make_own_controller = [](const DriverOptions&, const Simulator&, Renderer*) {
+    return std::make_unique<StraightOn>();
+  };
+  options.controller = "straight on";
+  options.maps = {"procedural:1", "procedural:2"};
+  options.agents_per_world = 250;
+  options.scenarios = 8;
+  options.steps = 100;
+  options.light_cycles = LightCycles::independent;
+  options.device = options.simulator = "cpu";
+  options.observer = &observer;
+  evaluate(options);
+  int red_lights = 0;
+  for (const Infraction& one : observer.found()) {
+    red_lights += one.is(kEventRedLight);
+    EXPECT_EQ(one.is(kEventRedLight), one.red_for_s > 0) << one.scenario << " " << one.agent << " " << one.step;
+  }
+  EXPECT_GT(red_lights, 20);
+}
+
 }  // namespace
 }  // namespace pictura
