@@ -173,7 +173,7 @@ class FunctionController final : public PolicyController {
     std::vector<uint8_t> is_drawn;
     for (int64_t slot = 0; slot < slots; ++slot) {
       const bool is_selected = mask.empty() || mask[slot] != 0;
-      is_drawn.push_back(is_selected && input.state.status[slot] == AgentStatus::active ? 1 : 0);
+      is_drawn.push_back(is_selected && takes_actions(input.state.status[slot]) ? 1 : 0);
     }
     num_driven_ = std::count(is_drawn.begin(), is_drawn.end(), 1);
     std::vector<float> log_probs(commands_out.size() * kNumActions), values(commands_out.size());
