@@ -91,6 +91,7 @@ MixedTraffic::MixedTraffic(const std::vector<OtherDriver>& others, const DriverO
     auto other = std::make_unique<Other>();
     other->driver = driver;
     const bool is_impaired = driver.impairment != Impairment::none;
+    if (is_impaired) unimpaired_share_ -= driver.share;
     const bool is_built_in = !options.controller.empty() && !options.make_own_controller;
     if (is_impaired && driver.impairment != Impairment::phantom_braking && is_built_in) {
       fail_usage("others: {}: has no effect on the controller {}, which does not use observations", driver.name,
@@ -138,7 +139,7 @@ size_t MixedTraffic::impaired_driver(Impairment impairment) const {
 
 size_t MixedTraffic::drawn_driver(uint32_t global_world, uint32_t agent) const {
   RandomStream random({.seed = options_.seed, .world = global_world, .agent = agent, .purpose = Purpose::driver});
-  double left = static_cast<double>(random.uniform());
+  double left = unimpaired_share_ * static_cast<double>(random.uniform());
   for (size_t i = 0; i < others_.size(); ++i) {
     if (others_[i]->driver.impairment != Impairment::none) continue;
     left -= others_[i]->driver.share;

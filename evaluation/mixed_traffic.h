@@ -63,6 +63,7 @@ class MixedTraffic {
 
   DriverOptions options_;
   std::vector<std::unique_ptr<Other>> others_;
+  double unimpaired_share_ = 1;  // share of agents that are not drawn to be impaired
 };
 
 }  // namespace pictura

@@ -143,6 +143,8 @@ TEST(MixedTraffic, CountsImpairedAgentsSeparately) {
   EXPECT_EQ(report.rows[0].asked + report.rows[1].asked + report.rows[2].asked, plain.rows[0].asked);
   EXPECT_NEAR(double(report.rows[1].asked) / agents, 0.4, 0.1) << "of any class";
   EXPECT_GT(report.rows[1].asked, report.rows[1].vehicle_episodes);
+  EXPECT_NEAR(double(report.rows[2].vehicle_episodes) / double(plain.rows[0].vehicle_episodes), 0.3, 0.08)
+      << "of all vehicles, not of those that are not impaired";
   EXPECT_LT(report.rows[1].km_per_vehicle.value, plain.rows[0].km_per_vehicle.value);
   EXPECT_EQ(evaluate_controller("lane", {"phantom_braking=0.4", "idle=0.3"}).rows[1].km_driven,
             report.rows[1].km_driven);
