@@ -280,9 +280,8 @@ void replay_worst(const EvaluateArguments& arguments, const EvaluationResults& r
   }
 }
 
-// Rejects --camera-severity with --merge, and several severities together with options that do not support them.
+// Rejects several severities together with options that do not support them.
 void check_severities(const CLI::App& command, const EvaluateArguments& arguments) {
-  if (!arguments.parts.empty()) reject_options(command, {"--camera-severity"}, "with --merge");
   if (arguments.severities.size() == 1) return;
   reject_options(command, {"--out", "--infractions", "--replay", "--gallery"},
                  "with several values of --camera-severity");
@@ -316,12 +315,8 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
   check_driver(evaluation, merges, /*has_scenes=*/false);
   const bool records = !arguments->replay.empty() || !arguments->gallery.empty();
   if (!records) reject_recording_options(command, "--replay or --gallery");
-  if (records && merges) fail_usage("--replay, --gallery: have no effect with --merge");
-  if (lists_infractions && merges) fail_usage("--infractions: has no effect with --merge");
-  if (!evaluation.others.empty()) {
-    if (merges) fail_usage("--others: has no effect with --merge");
-    if (records || lists_infractions)
-      fail_usage("--others: cannot be combined with --replay, --gallery or --infractions");
+  if (!evaluation.others.empty() && (records || lists_infractions)) {
+    fail_usage("--others: cannot be combined with --replay, --gallery or --infractions");
   }
   check_severities(command, *arguments);
   if (!arguments->gallery.empty()) {
@@ -366,11 +361,10 @@ void run_evaluate(const CLI::App& command, EvaluateArguments* arguments) {
   const bool has_scenes = !arguments->scenes.protocol.empty();
   if (!has_scenes || command.count("--scenarios") > 0) parse_scenarios(arguments->scenarios, &evaluation);
   if (has_scenes) return evaluate_in_scenes(command, *arguments);
+  if (!arguments->parts.empty()) reject_other_options(command, {"--merge", "--out", "--json"}, "with --merge");
   if (arguments->parts.empty() || !has_scene_results(arguments->parts.front())) {
     return evaluate_in_towns(command, arguments);
   }
-  reject_recording_options(command, "--replay or --gallery");
-  reject_options(command, {"--infractions", "--replay", "--replays"}, "on parts of an evaluation in scenes");
   merge_scene_evaluations(arguments->parts, arguments->out, arguments->json);
 }
 

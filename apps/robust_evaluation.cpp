@@ -97,36 +97,16 @@ void print_report(const RobustOptions& options, const RobustReport& report) {
 }  // namespace
 
 void run_robust_evaluation(const CLI::App& command, const EvaluateOptions& options, bool json) {
-  reject_options(command, {"--map",
-                           "--agents",
-                           "--steps",
-                           "--seed",
-                           "--density",
-                           "--others",
-                           "--camera-severity",
-                           "--conditioning",
-                           "--light-cycles",
-                           "--light-heads",
-                           "--merge",
-                           "--out",
-                           "--infractions",
-                           "--replay",
-                           "--replays",
-                           "--gallery",
-                           "--follow",
-                           "--cameras",
-                           "--scenes",
-                           "--control",
-                           "--start",
-                           "--rule",
-                           "--csv",
-                           "--rollouts"},
-                 "with --protocol robust, which fixes what is driven");
+  reject_other_options(
+      command,
+      {"--protocol", "--scenarios", "--json", "--policy", "--device", "--simulator", "--renderer", "--samples",
+       "--threads", "--sampled", "--average", "--decision-steps", "--rig", "--size", "--backbone"},
+      "with --protocol robust, which fixes what is driven");
   if (options.first_scenario != 0) fail_usage("--scenarios: with --protocol robust expected a number, got a part");
   RobustOptions driven;
   static_cast<DriverOptions&>(driven) = options;
   if (command.count("--scenarios") > 0) driven.scenarios = options.scenarios;
-  EvaluationProgress progress("the conditions that are finished");
+  EvaluationProgress progress("the conditions that are finished", "--scenarios N evaluates N of each condition");
   driven.on_progress = [&progress](double done, double eta_s) { progress.update(done, eta_s); };
   const RobustReport report = evaluate_robust(driven);
   progress.finish();

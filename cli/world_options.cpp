@@ -82,6 +82,14 @@ void reject_options(const CLI::App& command, std::initializer_list<const char*> 
   }
 }
 
+void reject_other_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why) {
+  for (const CLI::Option* const given : command.parse_order()) {
+    const std::string name = given->get_name();
+    const bool is_allowed = std::find(options.begin(), options.end(), name) != options.end();
+    if (!is_allowed && !given->get_positional()) fail_usage("{}: has no effect {}", name, why);
+  }
+}
+
 void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_out, std::string* policy_out) {
   add_map_or_scene(command, &world_out->map);
   add_world_options(command, world_out);

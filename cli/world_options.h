@@ -27,6 +27,8 @@ void reject_scene_options(const CLI::App& command, const std::string& map, std::
 
 /// Throws UsageError if one of these options was given. `why`: why the options have no effect.
 void reject_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
+/// Throws UsageError for the first given option that is not among `options`. Positional arguments are not options.
+void reject_other_options(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
 
 /// Adds MAP, all options above, --control, --steps, --policy, the shares of impaired agents, and the policy's device
 /// options.

@@ -53,6 +53,8 @@ class Evaluation(CommandCase):
         self.assertEqual(paths["merged"].read_bytes(), paths["whole"].read_bytes())
         self.assertIn("goals_per_vehicle_half_width_95", whole[0])
         self.assert_refused(1, "expected 3", "evaluate", "--merge", paths["whole"], paths["b"])
+        for option in (["--density", "light"], ["--sampled"], ["--infractions", "all.csv"]):
+            self.assert_refused(2, f"{option[0]}: has no effect with --merge", "evaluate", "--merge", paths["a"], *option)
         for x_m, path, scenarios in ((1.5, paths["a"], "0:1"), (2, paths["b"], "1:2")):
             rig = self.folder / "rig.toml"
             rig.write_text("".join(f"[[camera]]\nname = 'c{i}'\nwidth_px = 16\nheight_px = 9\nfocal_px = 9\nx_m = {x_m}\nz_m = 1.5\n" for i in range(4)))
