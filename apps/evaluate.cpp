@@ -338,7 +338,7 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
   if (lists_infractions && !arguments->json) print_groups(groups);
   if (!reports.back().interrupted) return replay_worst(*arguments, reports.front().results);
   int finished = 0;
-  for (const auto& [label, row] : labelled(reports)) finished += row.scenarios;
+  for (const auto& [label, row] : labelled(reports)) finished += row.driver.empty() ? row.scenarios : 0;
   const size_t num_densities = evaluation.agents_per_world > 0 ? 1 : evaluation.densities.size();
   throw Interrupted(
       fmt::format("interrupted; {} of {} scenarios are completed and counted above", finished,
