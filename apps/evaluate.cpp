@@ -289,7 +289,7 @@ void check_severities(const CLI::App& command, const EvaluateArguments& argument
 
 // Evaluates at each severity, in the same worlds. Ends early after an interrupt.
 Reports evaluate_severities(const std::vector<double>& severities, EvaluateOptions* evaluation) {
-  EvaluationProgress progress("the completed scenarios");
+  EvaluationProgress progress("the completed scenarios", "--scenarios A:B evaluates a range");
   const std::function<void(double, double)> update = [&progress](double done, double eta_s) {
     progress.update(done, eta_s);
   };
@@ -410,8 +410,12 @@ void add_evaluate_command(CLI::App& app) {
       ->delimiter(',')
       ->allow_extra_args(false);
   command
-      ->add_option("--scenarios", arguments->scenarios,
-                   "Scenarios per density: N, or A:B for scenarios A to B - 1; with --protocol: scenes, default: all")
+      ->add_option(
+          "--scenarios", arguments->scenarios,
+          fmt::format(
+              "Scenarios per density: N, or A:B for scenarios A to B - 1; with --protocol: scenes, default: all; "
+              "with --protocol robust: scenarios per condition, default: {}",
+              kRobustScenarios))
       ->capture_default_str();
   CLI::Option* const rig =
       command->add_option("--rig", options.rig,

@@ -217,7 +217,7 @@ void run_scene_evaluation(const CLI::App& command, const SceneArguments& argumen
     rollouts = std::make_unique<RolloutsFile>(arguments.rollouts);
     options.on_rollouts = [&rollouts](const SceneRollouts& scene) { rollouts->write(scene); };
   }
-  EvaluationProgress progress("the completed scenes");
+  EvaluationProgress progress("the completed scenes", "--scenarios A:B evaluates a range");
   options.on_progress = [&progress](double done, double eta_s) { progress.update(done, eta_s); };
   const SceneEvaluation evaluation = evaluate_scenes(options);
   progress.finish();

@@ -52,8 +52,8 @@ void EvaluationProgress::update(double done, double eta_s) {
     has_estimate_ = true;
     if (elapsed_s + eta_s > kLong_s) {
       line_.finish();
-      print_message("notice: this takes at most {}; ^C reports {}, and --scenarios A:B evaluates a range\n",
-                    format_duration(elapsed_s + eta_s), finished_);
+      print_message("notice: this takes at most {}; ^C reports {}, and {}\n", format_duration(elapsed_s + eta_s),
+                    finished_, shorter_);
     }
   }
   line_.update(fmt::format("evaluating: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));

@@ -24,13 +24,15 @@ CLI::Option* add_average_option(CLI::App* command, bool* average_out);
 /// Progress of an evaluation. For a long evaluation, also prints the expected time and ways to shorten it.
 class EvaluationProgress {
  public:
-  /// `finished`: results that an interrupt leaves, such as "the completed scenarios".
-  explicit EvaluationProgress(std::string finished) : finished_(std::move(finished)) {}
+  /// `finished`: results that an interrupt leaves, such as "the completed scenarios". `shorter`: option of a shorter
+  /// evaluation, with its effect.
+  EvaluationProgress(std::string finished, std::string shorter)
+      : finished_(std::move(finished)), shorter_(std::move(shorter)) {}
   void update(double done, double eta_s);
   void finish() { line_.finish(); }
 
  private:
-  std::string finished_;
+  std::string finished_, shorter_;
   ProgressLine line_;
   const Stopwatch since_start_;
   bool has_estimate_ = false;

@@ -39,6 +39,7 @@ class EvaluationClock {
 inline std::function<void(double, double)> progress_of_part(const std::function<void(double, double)>& on_progress,
                                                             std::ptrdiff_t finished, std::ptrdiff_t count) {
   return [&on_progress, finished, count](double done, double eta_s) {
+    if (done >= 1 && finished + 1 < count) return;  // the duration of a part is no longer known
     const double each_s = done < 1 ? eta_s / (1 - done) : 0;
     on_progress((static_cast<double>(finished) + done) / static_cast<double>(count),
                 eta_s + static_cast<double>(count - finished - 1) * each_s);
