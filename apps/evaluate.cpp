@@ -97,7 +97,8 @@ void print_table(const Reports& reports) {
   line("vehicles", [](const EvaluateRow& row) { return fmt::format("{}", row.vehicle_episodes); });
   line("km driven", [](const EvaluateRow& row) { return fmt::format("{:.2f}", row.km_driven); });
   estimate("km per infraction", &EvaluateRow::km_per_infraction);
-  line("vehicles with an infraction", [](const EvaluateRow& row) { return fmt::format("{}", row.infractions); });
+  line("vehicles with an infraction",
+       [](const EvaluateRow& row) { return row.counts_infractions() ? fmt::format("{}", row.infractions) : "-"; });
   print_result("share of vehicles with\n");
   estimate("  a collision", &EvaluateRow::collision_rate);
   estimate("  a collision at fault", &EvaluateRow::at_fault_collision_rate);

@@ -36,10 +36,9 @@ namespace pictura::python {
 
 namespace {
 
-/// Adds each metric of an evaluation's row as (value, half width of its 95 % confidence interval).
-template <typename Row>
-void add_metrics(const Row& row, py::dict* row_out) {
-  for (const auto& [name, estimate] : metrics_of(row)) {
+/// Adds each metric as (value, half width of its 95 % confidence interval).
+void add_metrics(const std::vector<std::pair<std::string, Estimate>>& metrics, py::dict* row_out) {
+  for (const auto& [name, estimate] : metrics) {
     (*row_out)[py::str(name)] = py::make_tuple(estimate.value, estimate.half_width_95);
   }
 }
@@ -49,10 +48,16 @@ void add_row(const EvaluateRow& row, py::dict* row_out) {
   py::dict& d = *row_out;
   d["scenarios"] = row.scenarios;
   d["steps"] = row.steps;
+  d["asked"] = row.asked;
+  d["spawned"] = row.spawned;
+  d["entered"] = row.entered;
+  d["left"] = row.left;
   d["vehicle_episodes"] = row.vehicle_episodes;
   d["infractions"] = row.infractions;
   d["km_driven"] = row.km_driven;
-  add_metrics(row, &d);
+  d["red_waits"] = row.red_waits;
+  add_metrics(metrics_of(row), &d);
+  add_metrics(rates_per_km_of(row), &d);
 }
 
 py::dict dict_of(const EvaluateReport& report) {
@@ -103,7 +108,7 @@ py::dict dict_of(const SceneEvaluation& evaluation, const std::vector<SceneAgent
     d["scenes"] = row.scenes;
     d["vehicle_episodes"] = row.vehicle_episodes;
     d["km_driven"] = row.km_driven;
-    add_metrics(row, &d);
+    add_metrics(metrics_of(row), &d);
     rows.append(d);
   }
   for (const SceneAgent& agent : agents) agent_dicts.append(dict_of(agent));
@@ -462,8 +467,8 @@ Raises:
 Examples:
     >>> options = {'scenarios': 1, 'steps': 20, 'agents_per_world': 8}
     >>> rows = pictura.evaluate('models/perspective.safetensors', ['procedural:1'], **options)['rows']
-    >>> sorted(rows[0])[:3]                         # doctest: +SKIP
-    ['agents_per_world', 'at_fault_collision_rate', 'camera_severity']
+    >>> sorted(rows[0])[:3]
+    ['active_at_end_share', 'asked', 'at_fault_collision_rate']
     >>> lane_keeper = pictura.evaluate('', ['procedural:1'], controller='lane', **options))");
   def_with_options<RobustOptions>(
       &module, {"evaluate_robust", {"checkpoint"}},

@@ -23,14 +23,11 @@ inline Json row_json(const EvaluateRow& row) {
                {"entered", row.entered},
                {"left", row.left},
                {"vehicle_episodes", row.vehicle_episodes},
-               {"infractions", row.infractions},
+               {"infractions", row.counts_infractions() ? Json(row.infractions) : Json(nullptr)},
                {"km_driven", row.km_driven},
                {"red_waits", row.red_waits}};
   for (const auto& [name, estimate] : metrics_of(row)) add_estimate(name, estimate, &json);
-  add_estimate("at_fault_collisions_per_km", row.at_fault_collisions_per_km, &json);
-  add_estimate("off_road_per_km", row.off_road_per_km, &json);
-  add_estimate("red_lights_per_km", row.red_lights_per_km, &json);
-  add_estimate("goals_per_km", row.goals_per_km, &json);
+  for (const auto& [name, estimate] : rates_per_km_of(row)) add_estimate(name, estimate, &json);
   return json;
 }
 

@@ -153,7 +153,7 @@ std::vector<EvaluateRow> rows_of(const EvaluationResults& results) {
   for (const DensityResult& density : results.densities) {
     EvaluateRow& row = rows.emplace_back(row_of(density, results.setting.steps));
     if (results.counts_all_collisions) continue;
-    row.collision_rate = row.wall_contact_rate = row.km_per_infraction = kUnknown;
+    row.collision_rate = row.wall_contact_rate = row.km_per_infraction = row.never_moved_share = kUnknown;
   }
   return rows;
 }
@@ -175,6 +175,13 @@ std::vector<std::pair<std::string, Estimate>> metrics_of(const EvaluateRow& row)
           {"reversing_share", row.reversing_share},
           {"red_wait_moved_m", row.red_wait_moved_m},
           {"stuck_at_end_share", row.stuck_at_end_share}};
+}
+
+std::vector<std::pair<std::string, Estimate>> rates_per_km_of(const EvaluateRow& row) {
+  return {{"at_fault_collisions_per_km", row.at_fault_collisions_per_km},
+          {"off_road_per_km", row.off_road_per_km},
+          {"red_lights_per_km", row.red_lights_per_km},
+          {"goals_per_km", row.goals_per_km}};
 }
 
 EvaluationResults merge(const std::vector<EvaluationResults>& parts, const std::vector<std::string>& names) {

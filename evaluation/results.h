@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -153,10 +154,15 @@ struct EvaluateRow {
   // share of vehicles.
   Estimate reversing_share, red_wait_moved_m, stuck_at_end_share;
   int64_t red_waits = 0;
+
+  /// False for files of an earlier version, which count only infractions at fault.
+  bool counts_infractions() const { return !std::isnan(km_per_infraction.value); }
 };
 
 /// Returns a row's metrics with their names in files.
 std::vector<std::pair<std::string, Estimate>> metrics_of(const EvaluateRow& row);
+/// Returns the metrics for roads that end, with their names in files.
+std::vector<std::pair<std::string, Estimate>> rates_per_km_of(const EvaluateRow& row);
 
 EvaluateRow row_of(const DensityResult& result, int steps);
 std::vector<EvaluateRow> rows_of(const EvaluationResults& results);

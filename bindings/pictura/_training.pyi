@@ -122,8 +122,8 @@ def evaluate(checkpoint: str, maps: collections.abc.Sequence[str], *, controller
     Examples:
         >>> options = {'scenarios': 1, 'steps': 20, 'agents_per_world': 8}
         >>> rows = pictura.evaluate('models/perspective.safetensors', ['procedural:1'], **options)['rows']
-        >>> sorted(rows[0])[:3]                         # doctest: +SKIP
-        ['agents_per_world', 'at_fault_collision_rate', 'camera_severity']
+        >>> sorted(rows[0])[:3]
+        ['active_at_end_share', 'asked', 'at_fault_collision_rate']
         >>> lane_keeper = pictura.evaluate('', ['procedural:1'], controller='lane', **options)
     """
 def evaluate_robust(checkpoint: str, *, controller: str | collections.abc.Callable = '', scenarios: typing.SupportsInt | typing.SupportsIndex = 24, argmax: bool = True, seed: typing.SupportsInt | typing.SupportsIndex = 1, num_threads: typing.SupportsInt | typing.SupportsIndex = 0, device: str = 'auto', simulator: str = 'auto', renderer: str = '', samples: str = '', rig: str = '', width_px: typing.SupportsInt | typing.SupportsIndex = 0, height_px: typing.SupportsInt | typing.SupportsIndex = 0, backbone: str = '', conditioning: dict = {}, average: bool = False, decision_steps: typing.SupportsInt | typing.SupportsIndex = 0, camera_severity: typing.SupportsFloat | typing.SupportsIndex = 0.0, on_progress: typing.Any = None) -> dict:

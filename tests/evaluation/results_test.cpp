@@ -119,6 +119,8 @@ TEST(Results, FilesOfFormat1LackLaterCounts) {
   EXPECT_TRUE(std::isnan(row.km_per_infraction.value));
   EXPECT_TRUE(std::isnan(row.collision_rate.value));
   EXPECT_TRUE(std::isnan(row.wall_contact_rate.value));
+  EXPECT_TRUE(std::isnan(row.never_moved_share.value));
+  EXPECT_FALSE(row.counts_infractions());
   EXPECT_DOUBLE_EQ(row.km_per_at_fault_infraction.value, 0.5);
   EXPECT_DOUBLE_EQ(row.at_fault_collision_rate.value, 0.5);
   // A part that counts everything does not extend the counts of the whole, which has the other part's format.
