@@ -11,6 +11,7 @@
 #include "pictura/common/support/parallel_for.h"
 #include "pictura/common/support/suggestion.h"
 #include "pictura/evaluation/estimate_json.h"
+#include "pictura/evaluation/scene_plan.h"
 #include "pictura/map/scenario/load_scenario.h"
 
 namespace pictura {
@@ -18,7 +19,7 @@ namespace pictura {
 namespace {
 
 constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
-constexpr double kRealismStep_s = 0.1, kRealismStepTolerance = 0.01;  // WOMD's steps are of 0.1000 to 0.1002 s
+constexpr double kRealismStep_s = 0.1;
 
 constexpr double kFarthest_m = 1e6;  // maximum distance of a state from the scene
 
@@ -186,23 +187,22 @@ double event_log_likelihood(const RealismTerm& term, bool recorded, int count, i
 RealismScene::RealismScene(std::shared_ptr<const Scenario> scenario)
     : scenario_(std::move(scenario)), road_(*scenario_) {
   const Scenario& scene = *scenario_;
-  PICTURA_CHECK(scene.num_steps > kRealismStart + 1, "scene {}: expected more than {} steps, got {}", scene.id,
-                kRealismStart + 1, scene.num_steps);
-  PICTURA_CHECK(std::abs(static_cast<double>(scene.dt_s) - kRealismStep_s) <= kRealismStepTolerance * kRealismStep_s,
-                "scene {}: expected time steps of {} s, got {} s", scene.id, kRealismStep_s, scene.dt_s);
+  PICTURA_CHECK(scene.num_steps > kChallengeStart + 1, "scene {}: expected more than {} steps, got {}", scene.id,
+                kChallengeStart + 1, scene.num_steps);
+  check_time_step(scene);
   std::vector<uint8_t> is_scored(scene.tracks.size(), scene.tracks_to_predict.empty());
   for (const PredictedTrack& predicted : scene.tracks_to_predict) is_scored[static_cast<size_t>(predicted.track)] = 1;
   if (scene.sdc_track >= 0) is_scored[static_cast<size_t>(scene.sdc_track)] = 1;
   for (size_t i = 0; i < scene.tracks.size(); ++i) {
     const auto track = static_cast<int32_t>(i);
-    if (!scene.valid_of(track)[kRealismStart]) continue;
+    if (!scene.valid_of(track)[kChallengeStart]) continue;
     if (is_scored[i]) scored_.push_back(tracks_.size());
     tracks_.push_back(track);
     const RecordedTrack& about = scene.tracks[i];
     objects_.push_back({about.type == TrackType::vehicle, static_cast<double>(about.length_m),
                         static_cast<double>(about.width_m), static_cast<double>(about.height_m)});
     for (size_t at = 0; at < num_poses(); ++at) {
-      const int32_t step = kRealismStart + 1 - static_cast<int32_t>(kRealismHistory) + static_cast<int32_t>(at);
+      const int32_t step = kChallengeStart + 1 - static_cast<int32_t>(kRealismHistory) + static_cast<int32_t>(at);
       RealismPose& pose = recorded_.emplace_back();
       if (step >= scene.num_steps || !scene.valid_of(track)[step]) continue;
       const TrackState& state = scene.states_of(track)[step];
@@ -212,7 +212,7 @@ RealismScene::RealismScene(std::shared_ptr<const Scenario> scenario)
     }
   }
   PICTURA_CHECK(!scored_.empty(), "scene {}: expected a road user to score at step {}, got none", scene.id,
-                kRealismStart);
+                kChallengeStart);
   recorded_features_ = features_of(recorded_);
 }
 
@@ -230,13 +230,13 @@ std::vector<int64_t> RealismScene::scored_ids() const {
 }
 
 RealismFeatures RealismScene::features_of(const std::vector<RealismPose>& poses) const {
-  return realism_features(objects_, scored_, poses, road_, kRealismStart + 1, kRealismStep_s);
+  return realism_features(objects_, scored_, poses, road_, kChallengeStart + 1, kRealismStep_s);
 }
 
 std::vector<RealismPose> RealismScene::poses_of(const SceneRollouts& rollouts, size_t rollout) const {
   const std::string& id = scenario_->id;
-  PICTURA_CHECK(rollouts.steps == kRealismSteps, "scene {}: expected rollouts of {} steps, got {}", id, kRealismSteps,
-                rollouts.steps);
+  PICTURA_CHECK(rollouts.steps == kChallengeSteps, "scene {}: expected rollouts of {} steps, got {}", id,
+                kChallengeSteps, rollouts.steps);
   const std::vector<int64_t> ids = track_ids();
   std::unordered_map<int64_t, size_t> objects;
   for (size_t i = 0; i < ids.size(); ++i) objects[ids[i]] = i;
@@ -248,11 +248,11 @@ std::vector<RealismPose> RealismScene::poses_of(const SceneRollouts& rollouts, s
     const int64_t track = rollouts.track_ids[i];
     const auto found = objects.find(track);
     PICTURA_CHECK(found != objects.end(), "scene {}: rollout {}: track {} is absent at step {} of the recording", id,
-                  rollout, track, kRealismStart);
+                  rollout, track, kChallengeStart);
     PICTURA_CHECK(!is_given[found->second], "scene {}: rollout {}: track {} occurs twice", id, rollout, track);
     is_given[found->second] = 1;
-    for (size_t step = 0; step < kRealismSteps; ++step) {
-      const SimulatedState& state = states[i * kRealismSteps + step];
+    for (size_t step = 0; step < kChallengeSteps; ++step) {
+      const SimulatedState& state = states[i * kChallengeSteps + step];
       const RealismPose pose{static_cast<double>(state.x_m) - origin_m[0], static_cast<double>(state.y_m) - origin_m[1],
                              static_cast<double>(state.z_m) - origin_m[2], static_cast<double>(state.heading_rad),
                              true};
@@ -269,7 +269,7 @@ std::vector<RealismPose> RealismScene::poses_of(const SceneRollouts& rollouts, s
   const auto missing = std::find(is_given.begin(), is_given.end(), 0);
   PICTURA_CHECK(missing == is_given.end(),
                 "scene {}: rollout {}: expected all {} tracks of step {}, track {} is missing", id, rollout, ids.size(),
-                kRealismStart, ids[static_cast<size_t>(missing - is_given.begin())]);
+                kChallengeStart, ids[static_cast<size_t>(missing - is_given.begin())]);
   return poses;
 }
 

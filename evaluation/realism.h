@@ -35,9 +35,6 @@ std::vector<std::string> realism_version_names();
 /// Throws UsageError listing the names.
 const RealismVersion& realism_version(const std::string& name);
 
-/// Last recorded step before the rollouts, and steps per rollout.
-constexpr int32_t kRealismStart = 10, kRealismSteps = 80;
-
 using RealismLikelihoods = std::array<double, kNumRealismFeatures>;
 
 /// Results of one scene; NaN: the scene has no data.
@@ -64,12 +61,12 @@ constexpr double kShortTimeToCollision_s = 0.95;
 class RealismScene {
  public:
   /// The scored road users are the self-driving car and the tracks to predict, or all road users if there are no tracks
-  /// to predict. They must be present at kRealismStart. Throws Error naming the scene if no step follows kRealismStart,
-  /// no road user is scored, or the time step is not 0.1 s.
+  /// to predict. They must be present at kChallengeStart. Throws Error naming the scene if no step follows
+  /// kChallengeStart, no road user is scored, or the time step is not 0.1 s.
   explicit RealismScene(std::shared_ptr<const Scenario> scenario);
 
   const Scenario& scenario() const { return *scenario_; }
-  /// track_ids(): tracks present at kRealismStart; every rollout must contain them.
+  /// track_ids(): tracks present at kChallengeStart; every rollout must contain them.
   std::vector<int64_t> track_ids() const;
   std::vector<int64_t> scored_ids() const;
 
@@ -82,7 +79,7 @@ class RealismScene {
   SceneRealism score(const SceneRollouts& rollouts, const RealismVersion& version) const;
 
  private:
-  size_t num_poses() const { return kRealismHistory + static_cast<size_t>(kRealismSteps); }
+  size_t num_poses() const { return kRealismHistory + static_cast<size_t>(kChallengeSteps); }
   /// Returns [objects][num_poses].
   std::vector<RealismPose> poses_of(const SceneRollouts& rollouts, size_t rollout) const;
   RealismFeatures features_of(const std::vector<RealismPose>& poses) const;

@@ -66,10 +66,14 @@ void repair_first_headings(int32_t start_step, float max_turn_deg, Scenario* sce
 
 }  // namespace
 
-std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const SceneProtocol& protocol) {
-  constexpr float kStep_s = kMaxStep_s, kTolerance = 0.01f;  // WOMD's steps are of 0.1000 to 0.1002 s
+void check_time_step(const Scenario& scenario) {
+  constexpr float kStep_s = kMaxStep_s, kTolerance = 0.01f;
   PICTURA_CHECK(std::abs(scenario.dt_s - kStep_s) <= kTolerance * kStep_s,
                 "scene {}: expected time steps of {} s, got {} s", scenario.id, kStep_s, scenario.dt_s);
+}
+
+std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const SceneProtocol& protocol) {
+  check_time_step(scenario);
   for (RecordedTrack& track : scenario.tracks) {
     track.length_m *= protocol.box_scale;
     track.width_m *= protocol.box_scale;

@@ -8,6 +8,10 @@
 
 namespace pictura {
 
+/// Throws Error naming the scene if its time step is not 0.1 s. 1 % of tolerance, because WOMD's steps are of 0.1000 to
+/// 0.1002 s.
+void check_time_step(const Scenario& scenario);
+
 /// Scales the scene's boxes. Replaces a track's first heading by its second if they differ by more than
 /// SceneProtocol::max_first_turn_deg. Throws Error if the scene's time step is not 0.1 s.
 std::shared_ptr<const Scenario> protocol_scene(Scenario scenario, const SceneProtocol& protocol);

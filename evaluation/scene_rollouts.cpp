@@ -18,8 +18,6 @@ namespace pictura {
 
 namespace {
 
-constexpr int kChallengeStart = 10, kChallengeSteps = 80;
-
 // Field numbers and enumeration values of the schema.
 enum class Submission : uint8_t { scenario_rollouts = 1, submission_type = 2 };
 enum class Rollouts : uint8_t { scenario_id = 1, joint_scenes = 2 };

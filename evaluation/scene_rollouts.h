@@ -27,10 +27,9 @@ struct SceneRollouts {
   std::vector<std::vector<SimulatedState>> rollouts;  // [rollouts][objects * steps]
 };
 
-/// Number of rollouts of each scene in the challenge.
-constexpr int kChallengeRollouts = 32;
-/// Throws UsageError if the protocol differs from the challenge's: kChallengeRollouts of 80 steps from step 10 on, with
-/// all present road users.
+/// In the challenge: number of rollouts of each scene, last recorded step before them, and steps of each.
+constexpr int32_t kChallengeRollouts = 32, kChallengeStart = 10, kChallengeSteps = 80;
+/// Throws UsageError if the protocol differs from the challenge's, which has all present road users.
 void check_rollouts(const SceneProtocol& protocol);
 
 /// Encodes a message ScenarioRollouts (waymo_open_dataset/protos/sim_agents_submission.proto). Throws Error if a track

@@ -145,13 +145,13 @@ Scenario straight_road() {
 
 /// Car 7 continues from its place at step 10 with this velocity; car 9 stands.
 SceneRollouts rollout_at(double speed_mps, double sideways_mps, int count = 1) {
-  SceneRollouts rollouts{"straight", kRealismSteps, {7, 9}, {}};
+  SceneRollouts rollouts{"straight", kChallengeSteps, {7, 9}, {}};
   std::vector<SimulatedState> states;
-  for (int step = 1; step <= kRealismSteps; ++step) {
+  for (int step = 1; step <= kChallengeSteps; ++step) {
     states.push_back(
         {static_cast<float>(8 + 0.1 * step * speed_mps), static_cast<float>(0.1 * step * sideways_mps), 0.75f, 0});
   }
-  states.resize(2 * kRealismSteps, {36, 2.5f, 0.75f, 0});
+  states.resize(2 * kChallengeSteps, {36, 2.5f, 0.75f, 0});
   rollouts.rollouts.assign(static_cast<size_t>(count), states);
   return rollouts;
 }
@@ -287,7 +287,7 @@ TEST_F(RealismFiles, ReadBackEqual) {
   // Objects in another order in the second rollout are the same.
   SceneRollouts turned = rollout_at(8, 0, 1);
   std::swap(turned.track_ids[0], turned.track_ids[1]);
-  std::rotate(turned.rollouts[0].begin(), turned.rollouts[0].begin() + kRealismSteps, turned.rollouts[0].end());
+  std::rotate(turned.rollouts[0].begin(), turned.rollouts[0].begin() + kChallengeSteps, turned.rollouts[0].end());
   const std::string first = encoded(rollout_at(8, 0, 1)), second = encoded(turned);
   std::string both;
   append_bytes(1, first + second.substr(second.find('\x12')), &both);
