@@ -68,7 +68,9 @@ bool keeps_images(const Config& config, int num_agents, Device device, int64_t m
 double estimated_bytes(const Config& config, bool keeps_images) {
   const SimulatorSection& section = config.simulator;
   const double agents = section.num_slots, steps = config.train.num_steps;
-  const double worlds = 2 * agents / (section.min_agents + section.max_agents),
+  // Each world of a recorded scene has max_agents slots.
+  const int min_agents = section.has_scenes() ? section.max_agents : section.min_agents;
+  const double worlds = 2 * agents / (min_agents + section.max_agents),
                boxes = agents + worlds * training_world(config, Device{}).parked_cars;
   // Observations of steps + 2 steps: one step in the simulator, and steps + 1 in the rollout.
   double bytes =

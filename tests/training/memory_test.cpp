@@ -59,8 +59,10 @@ TEST_P(EachRollout, UsesAboutTheEstimatedMemory) {
 
 TEST(Memory, ReplayedTracksOfScenesAreCounted) {
   Config config = config_of("vector", "auto", 240);
+  config.simulator.min_agents = config.simulator.max_agents;
   const double in_towns = estimated_bytes(config, true);
   config.simulator.maps = {"scenes:any"};
+  config.simulator.min_agents = 1;  // without effect: each world of a scene has max_agents slots
   config.simulator.scenes.max_replayed = config.simulator.parked_cars;
   EXPECT_EQ(estimated_bytes(config, true), in_towns);
   config.simulator.scenes.max_replayed += 96;
