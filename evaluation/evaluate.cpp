@@ -30,9 +30,9 @@ DensityOf density_of(Density density) {
   return {kDensityNames[index], kDensityAgents[index]};
 }
 
-// Number of worlds simulated together. On a GPU it is at least 200, the paper's number of scenarios per density; 200
-// worlds saturate the GPU. Images do not limit this number, because they are drawn for only train.forward_chunk agents
-// at a time.
+// Number of worlds simulated together. On a GPU, for the paper's densities, it is at least 200, the number of scenarios
+// per density; 200 worlds saturate the GPU. Images do not limit this number, because they are drawn for only
+// train.forward_chunk agents at a time.
 int worlds_per_batch(Device device, int agents_per_world) {
   const int max_agents = device.is_host() ? 4096 : 32768;
   return std::max(1, max_agents / agents_per_world);
