@@ -13,11 +13,11 @@ class DecisionClock {
  public:
   explicit DecisionClock(int64_t decision_steps) : decision_steps_(decision_steps) {}
 
-  /// Returns the `active` slots (i64 [n], ascending) that decide at `step`. Call it once before each step. All agents
-  /// of worlds with a nonzero episode_over (u8 [worlds], or empty) decide, because learning needs their last value.
-  /// On a device, waits unless all agents decide.
-  at::Tensor select_deciding(const SimulatorArrays& input, const at::Tensor& active, int64_t step,
-                             Span<const uint8_t> episode_over, PolicyExecutor* executor);
+  /// Returns the `active` slots (i64 [n], ascending) that decide at `step`. Call it once before each step. With
+  /// decides_at_end, all agents decide at the end of an episode, because learning needs their last value. On a device,
+  /// waits unless all agents decide.
+  at::Tensor select_deciding(const SimulatorArrays& input, const at::Tensor& active, int64_t step, bool decides_at_end,
+                             PolicyExecutor* executor);
 
  private:
   const int64_t decision_steps_;

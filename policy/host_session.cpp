@@ -192,8 +192,8 @@ class HostController final : public PolicyController {
     if (decision_steps == 1) return;
     const std::vector<uint8_t> acted_before = std::exchange(acted_, std::vector<uint8_t>(actions_.size()));
     for (const int64_t slot : *slots_inout) acted_[slot] = 1;
-    if (step % decision_steps == 0 || acted_before.size() != acted_.size()) return;
-    const HeldActions held(input, acted_before.data(), nullptr);
+    if (all_decide(step, decision_steps, acted_before.size(), acted_.size())) return;
+    const HeldActions held(input, acted_before.data(), /*decides_at_end=*/false);
     std::erase_if(*slots_inout, [&](int64_t slot) { return held.holds(slot); });
   }
 

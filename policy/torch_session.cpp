@@ -113,7 +113,7 @@ class TorchController final : public PolicyController {
     }
     const at::Tensor active = active_slots(input, mask, false, parts_.executor.get());
     num_driven_ = active.size(0);
-    const at::Tensor slots = clock_.select_deciding(input, active, step_++, {}, parts_.executor.get());
+    const at::Tensor slots = clock_.select_deciding(input, active, step_++, /*decides_at_end=*/false, parts_.executor.get());
     const Decision decision = parts_.decide({.observations = input.observations,
                                              .scene = &input.scene,
                                              .views = input.views,

@@ -91,7 +91,7 @@ at::Tensor Collector::record(int64_t step) {
   const at::Tensor own = run_.opponents ? run_.opponents->own_slots(input) : at::Tensor();
   const Span<const uint8_t> mask = own.defined() ? span_of<const uint8_t>(own) : Span<const uint8_t>();
   const at::Tensor slots = clock_.select_deciding(input, active_slots(input, mask, true, run_.executor.get()), step,
-                                                  run_.simulator->episode_over(), run_.executor.get());
+                                                  /*decides_at_end=*/true, run_.executor.get());
   // Slots with kept images differ between rollouts, so no graph can record them.
   if (observations.keep_images())
     observations.record(step, seen_slots(run_, slots));

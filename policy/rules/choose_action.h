@@ -86,13 +86,14 @@ struct HeldActions {
   const uint8_t* episode_over = nullptr;                         // [worlds] 1: no agent holds; or null
 
   HeldActions() = default;
-  HeldActions(const SimulatorArrays& input, const uint8_t* its_acted_before, const uint8_t* its_episode_over)
+  /// decides_at_end: whether no agent holds its action at the end of an episode.
+  HeldActions(const SimulatorArrays& input, const uint8_t* its_acted_before, bool decides_at_end)
       : acted_before(its_acted_before),
         world_of_slot(input.slots.world_of_slot.data()),
         life_step(input.state.life_step),
         left(input.state.left),
         episode_step(input.episode_step.data()),
-        episode_over(its_episode_over) {}
+        episode_over(decides_at_end ? input.episode_over.data() : nullptr) {}
 
   PICTURA_HD bool holds(int64_t slot) const {
     if (acted_before == nullptr || !acted_before[slot] || left[slot]) return false;
@@ -100,6 +101,12 @@ struct HeldActions {
     return episode_step[world] != life_step[slot] && (episode_over == nullptr || !episode_over[world]);
   }
 };
+
+/// Whether all active agents decide at a step, and none holds its action. num_acted: number of slots at the previous
+/// step, 0 at the first.
+constexpr bool all_decide(int64_t step, int64_t decision_steps, size_t num_acted, size_t num_slots) {
+  return step % decision_steps == 0 || num_acted != num_slots;
+}
 
 /// Test whether the policy is evaluated for a slot.
 struct DecidingSlots {

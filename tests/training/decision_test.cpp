@@ -79,7 +79,7 @@ TEST(HeldActions, AreChosenAgainAtIntervalsAndEpisodeStarts) {
   for (int64_t step = 0; step < 12; ++step) {
     const SimulatorArrays input = simulator->arrays();
     const at::Tensor active = active_slots(input, {}, true, executor.get());
-    const int64_t count = clock.select_deciding(input, active, step, simulator->episode_over(), executor.get()).size(0);
+    const int64_t count = clock.select_deciding(input, active, step, /*decides_at_end=*/true, executor.get()).size(0);
     EXPECT_TRUE(count == 0 || count == active.size(0)) << step;
     deciding += count > 0 ? 'd' : 'h';
     simulator->step(Array(idle));
@@ -102,8 +102,8 @@ TEST(HeldActions, AreChosenAgainAtTheStartOfALife) {
   int begun = 0, left = 0;
   for (int64_t step = 0; step < 400; ++step) {
     const SimulatorArrays input = simulator->arrays();
-    const at::Tensor deciding =
-        clock.select_deciding(input, active_slots(input, {}, true, executor.get()), step, {}, executor.get());
+    const at::Tensor deciding = clock.select_deciding(input, active_slots(input, {}, true, executor.get()), step,
+                                                      /*decides_at_end=*/false, executor.get());
     std::vector<bool> decides(6);
     for (int64_t i = 0; i < deciding.size(0); ++i) decides[deciding[i].item<int64_t>()] = true;
     for (size_t slot = 0; slot < decides.size(); ++slot) {

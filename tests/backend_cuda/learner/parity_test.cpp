@@ -191,13 +191,11 @@ TEST_F(CudaLearnerTest, SelectsSlotsThatHoldNoAction) {
     const std::vector<uint8_t> acted_before = random_flags(kSlots, 0.7, &random);
     const DeviceBuffer<uint8_t> copy = on_device(acted_before);
     const size_t active = same_active(worlds, executors, {}).size();
-    for (const bool all_at_the_end : {false, true}) {
+    for (const bool decides_at_end : {false, true}) {
       const auto select = [&](LearnerExecutor* executor, Span<int64_t> slots, bool on_device) {
-        const Simulator& simulator = on_device ? *worlds.cuda : *worlds.cpu;
-        const SimulatorArrays input = simulator.arrays();
-        const HeldActions actions(input, on_device ? copy.data() : acted_before.data(),
-                                  all_at_the_end ? simulator.episode_over().data() : nullptr);
-        return executor->select_deciding({input.state.status, {}, nullptr, actions}, slots);
+        const SimulatorArrays& input = (on_device ? *worlds.cuda : *worlds.cpu).arrays();
+        const HeldActions held_actions(input, on_device ? copy.data() : acted_before.data(), decides_at_end);
+        return executor->select_deciding({input.state.status, {}, nullptr, held_actions}, slots);
       };
       const size_t deciding = same_selection(kSlots, executors, select).size();
       EXPECT_LE(deciding, active);
