@@ -102,17 +102,16 @@ at::Device torch_device(Device device) {
   return device.is_host() ? at::Device(at::kCPU) : at::Device(at::kCUDA, static_cast<c10::DeviceIndex>(device.index));
 }
 
-namespace {
-
-c10::Stream torch_stream(Device device) {
-  const at::Device where = torch_device(device);
-  return c10::impl::VirtualGuardImpl(where.type()).getStream(where);
+std::optional<c10::Stream> torch_stream(Stream stream, Device device) {
+  if (device.is_host()) return std::nullopt;
+  // Torch identifies the legacy default stream by 0, and other streams that it did not create by their handle.
+  return c10::Stream(c10::Stream::UNSAFE, torch_device(device), reinterpret_cast<c10::StreamId>(stream.handle));
 }
 
-}  // namespace
-
 Stream current_stream(Device device) {
-  return device.is_host() ? Stream{} : Stream{torch_stream(device).native_handle()};
+  if (device.is_host()) return {};
+  const at::Device where = torch_device(device);
+  return {c10::impl::VirtualGuardImpl(where.type()).getStream(where).native_handle()};
 }
 
 namespace {

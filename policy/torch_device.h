@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include <ATen/ATen.h>
 
@@ -11,6 +12,8 @@
 namespace pictura {
 
 at::Device torch_device(Device device);
+/// Returns a stream of any library as torch's, for stream guards; none on the host.
+std::optional<c10::Stream> torch_stream(Stream stream, Device device);
 
 /// Stream that graphs can capture, because it does not implicitly wait for other streams.
 class OwnStream {

@@ -1,5 +1,6 @@
 // Sessions in which torch computes the policy.
 #include <ATen/Parallel.h>
+#include <c10/core/StreamGuard.h>
 
 #include "pictura/backends/make_policy_executor.h"
 #include "pictura/common/support/parallel_for.h"
@@ -105,15 +106,17 @@ class TorchController final : public PolicyController {
 
   std::string_view name() const override { return "policy"; }
 
-  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream) override {
+  void act(const SimulatorArrays& input, Span<const uint8_t> mask, Span<Command> commands_out, Stream stream) override {
     check_controller_arrays(name(), input, parts_.device, mask, commands_out);
+    const c10::OptionalStreamGuard guard(torch_stream(stream, parts_.device));
     const auto num_slots = static_cast<int64_t>(commands_out.size());
     if (!actions_.defined() || actions_.size(0) != num_slots) {
       actions_ = at::zeros({num_slots}, at::TensorOptions(at::kInt).device(torch_device(parts_.device)));
     }
     const at::Tensor active = active_slots(input, mask, false, parts_.executor.get());
     num_driven_ = active.size(0);
-    const at::Tensor slots = clock_.select_deciding(input, active, step_++, /*decides_at_end=*/false, parts_.executor.get());
+    const at::Tensor slots =
+        clock_.select_deciding(input, active, step_++, /*decides_at_end=*/false, parts_.executor.get());
     const Decision decision = parts_.decide({.observations = input.observations,
                                              .scene = &input.scene,
                                              .views = input.views,
@@ -121,8 +124,8 @@ class TorchController final : public PolicyController {
                                             num_slots, slots, renderer_);
     const Span<int32_t> actions = span_of<int32_t>(actions_);
     parts_.executor->choose_actions(input, span_of<const int64_t>(slots), span_of<const float>(decision.log_probs),
-                                    choice_, actions, current_stream(parts_.device));
-    parts_.executor->write_commands(actions, mask, commands_out, current_stream(parts_.device));
+                                    choice_, actions, stream);
+    parts_.executor->write_commands(actions, mask, commands_out, stream);
   }
 
   int64_t num_driven() const override { return num_driven_; }

@@ -2,6 +2,7 @@
 unless PICTURA_REQUIRE_GPU=1 requires one."""
 
 import os
+import pathlib
 import subprocess
 import sys
 
@@ -93,6 +94,17 @@ def test_calls_wait_for_work_of_another_stream(town):
         assert (reward.cpu().numpy() == expected.step(actions).reward.numpy()).all()
         torch.cuda.current_stream().wait_stream(stream)
         stream.wait_stream(torch.cuda.current_stream())
+
+
+def test_policies_decide_on_the_stream_of_their_simulator(town):
+    session = pictura.PolicySession(str(pathlib.Path(__file__).parents[2] / "models" / "vector.safetensors"), device="cuda")
+    options = {**session.evaluation_world(100), "device": "cuda"}
+    states = []
+    for stream in (0, torch.cuda.Stream().cuda_stream):
+        simulator = pictura.Simulator([town], [(0, 40)] * 64, stream=stream, **options)
+        simulator.run(session.make_controller(simulator), 100)
+        states.append(simulator.state_hash())
+    assert states[0] == states[1]
 
 
 def test_memory_outlives_the_simulator(town):
