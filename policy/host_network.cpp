@@ -126,16 +126,13 @@ class ParameterReader {
 class SetEncoder {
  public:
   SetEncoder(const Config& config, ParameterReader* read) : width_(config.policy.embedding_width) {
-    int64_t set = 0;
-    for (const ObservationArray& array : kObservationArrays) {
-      if (array.part == ObservationPart::own || array.type != ElementType::f32) continue;
-      if (config.reads(array.part)) {
-        const RowFeatures features = row_features_of(config.policy, array.name);
-        const RowSize size{0, array.features, features, /*keeps_rows=*/true};
-        groups_.push_back({read->group(std::string(array.name), size.width(), config.policy), size, array.rows, set,
-                           std::string(array.name)});
-      }
-      ++set;
+    for (size_t i = 0; i < std::size(kObservationArrays); ++i) {
+      const ObservationArray& array = kObservationArrays[i];
+      if (!is_set(array) || !config.reads(array.part)) continue;
+      const RowFeatures features = row_features_of(config.policy, array.name);
+      const RowSize size{0, array.features, features, /*keeps_rows=*/true};
+      groups_.push_back({read->group(std::string(array.name), size.width(), config.policy), size, array.rows,
+                         entity_set_of(i), std::string(array.name)});
     }
   }
 

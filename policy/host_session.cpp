@@ -9,6 +9,7 @@
 #include "pictura/policy/host_network.h"
 #include "pictura/policy/host_passes.h"
 #include "pictura/policy/learning_device.h"
+#include "pictura/policy/network_shape.h"
 #include "pictura/policy/session_parts.h"
 #include "pictura/simulator/actions.h"
 #include "pictura/simulator/controllers/host_controllers.h"
@@ -40,9 +41,10 @@ class GatheredRows {
 
   /// Sets all auxiliary features to zero (see simulator/observation.h), as if the simulator did not observe them.
   void hide_auxiliary() {
-    constexpr size_t kOfEgo = kEgoFeatures - 2, kOfPartner = kPartnerFeatures - 1;
-    for (size_t i = 0; i < ego_.size(); ++i) ego_[i] = i % kEgoFeatures < kOfEgo ? ego_[i] : 0;
-    for (size_t i = kOfPartner; i < partners_.size(); i += kPartnerFeatures) partners_[i] = 0;
+    for (size_t i = 0; i < ego_.size(); ++i) ego_[i] = i % kEgoFeatures < kSeenEgoFeatures ? ego_[i] : 0;
+    for (size_t i = 0; i < partners_.size(); ++i) {
+      partners_[i] = i % kPartnerFeatures < kSeenPartnerFeatures ? partners_[i] : 0;
+    }
   }
 
   ObservationView view;
@@ -81,12 +83,12 @@ struct HostSession final : SessionParts {
   void decide(const PolicyInput& input, int64_t batch, Span<const int64_t> indices, Renderer* renderer,
               float* logits_out, float* values_out) const {
     if (config.reads_images()) check_images(input, static_cast<size_t>(batch), renderer);
-    constexpr int64_t kMostAtOnce = 512;  // agents; at the paper's image size, the images of an agent take 62 KB
+    constexpr int64_t kMaxAtOnce = 512;  // agents; at the paper's image size, the images of an agent take 62 KB
     const auto total = static_cast<int64_t>(indices.size());
-    const int64_t max_members = std::min<int64_t>(config.train.forward_chunk, kMostAtOnce);
-    for (int64_t begin = 0; begin < total; begin += max_members) {
+    const int64_t max_agents = std::min<int64_t>(config.train.forward_chunk, kMaxAtOnce);
+    for (int64_t begin = 0; begin < total; begin += max_agents) {
       const auto some =
-          indices.subspan(static_cast<size_t>(begin), static_cast<size_t>(std::min(max_members, total - begin)));
+          indices.subspan(static_cast<size_t>(begin), static_cast<size_t>(std::min(max_agents, total - begin)));
       GatheredRows rows(config, input.observations, batch, some);
       if (input.hides_auxiliary) rows.hide_auxiliary();
       HostObservation observation{static_cast<int64_t>(some.size()), rows.view, {}};

@@ -65,10 +65,9 @@ Observation select_arrays(const Config& config, const ObservationView& view, Dev
 }
 
 void hide_auxiliary(Observation* observation_inout) {
-  constexpr int64_t kOfEgo = kEgoFeatures - num_ego_features(/*sees_images=*/true), kOfPartner = 1;
   at::Tensor &ego = observation_inout->ego, &partners = observation_inout->partners;
-  ego.narrow(-1, kEgoFeatures - kOfEgo, kOfEgo).zero_();
-  if (partners.defined()) partners.narrow(-1, kPartnerFeatures - kOfPartner, kOfPartner).zero_();
+  ego.slice(-1, kSeenEgoFeatures).zero_();
+  if (partners.defined()) partners.slice(-1, kSeenPartnerFeatures).zero_();
 }
 
 std::vector<ImageBlock> allocate_images(const Rig& rig, std::vector<int64_t> batch, Device device) {

@@ -48,18 +48,6 @@ inline constexpr at::Tensor Observation::* kObservationTensors[] = {
 #undef X
 };
 
-/// Whether an array holds an entity set's members.
-constexpr bool is_set(const ObservationArray& array) {
-  return array.part != ObservationPart::own && array.type == ElementType::f32;
-}
-/// EntitySet of kObservationArrays[array_index].
-constexpr int entity_set_of(size_t array_index) {
-  int set = 0;
-  for (size_t i = 0; i < array_index; ++i) set += is_set(kObservationArrays[i]);
-  return set;
-}
-static_assert(entity_set_of(std::size(kObservationArrays)) == kNumEntitySets, "the list and EntitySet have equal sets");
-
 /// Allocates uninitialised tensors [rows, slots, ...] for the arrays that the policy reads.
 Observation allocate_observations(const Config& config, int64_t rows, int64_t slots, Device device);
 

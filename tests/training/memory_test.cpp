@@ -8,6 +8,7 @@
 
 #include "pictura/configuration/apply_config.h"
 #include "pictura/map/load_map.h"
+#include "pictura/policy/network_shape.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/training/run.h"
 
