@@ -219,6 +219,9 @@ std::unique_ptr<PolicyController> HostSession::make_controller(Renderer* rendere
 std::unique_ptr<SessionParts> open_host_session(const std::string& path, const SessionOptions& options) {
   const StoredPolicy saved = read_stored_policy(path, options.average);
   const Config config = with_session_options(saved.config, options);
+  PICTURA_CHECK(config.policy.backbone == saved.config.policy.backbone,
+                "{}: policy.backbone: expected \"{}\", as in training, got \"{}\"", path, saved.config.policy.backbone,
+                config.policy.backbone);
   const Device device = open_learning_device(config);
   PICTURA_CHECK(device.is_host(), "{}: {}: expected the host", path, name_of(device));
   return std::make_unique<HostSession>(saved, config, chosen_rig(saved, options), options.camera_severity);
