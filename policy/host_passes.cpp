@@ -128,7 +128,6 @@ void bias_gelu_backward(const float* slope, const float* grad_out, int64_t rows,
 
 void bias_norm(const float* x, const float* bias, int64_t rows, int64_t channels, float* out,
                float* inverse_deviations_out) {
-  constexpr float kNormEpsilon = 1e-5f;
   const auto count = static_cast<float>(channels);
   for (int64_t row = 0; row < rows; ++row) {
     const float* const from = x + row * channels;

@@ -20,7 +20,7 @@ void bias_gelu(const float* x, const float* bias, int64_t rows, int64_t channels
 void bias_gelu_backward(const float* slope, const float* grad_out, int64_t rows, int64_t channels, float* grad_x_out,
                         float* bias_grad_inout);
 
-/// Computes out = layer norm of (x + bias) over channels, without parameters, with an epsilon of 1e-5.
+/// Computes out = layer norm of (x + bias) over channels, without parameters, with kNormEpsilon.
 /// inverse_deviations_out gets 1 / (standard deviation) of each row, unless null. x, out: [rows, channels]; out may be
 /// x.
 void bias_norm(const float* x, const float* bias, int64_t rows, int64_t channels, float* out,

@@ -4,7 +4,6 @@
 namespace pictura::cuda {
 
 constexpr int kWarp = 32;
-constexpr float kNormEpsilon = 1e-5f;
 
 __device__ inline float gelu(float x) { return 0.5f * x * (1.0f + erff(x * 0.70710678f)); }
 // Derivative of gelu(): Phi(x) + x phi(x).

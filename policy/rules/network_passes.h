@@ -11,6 +11,9 @@ namespace pictura {
 
 enum class ActivationType : uint8_t { f32, bf16 };
 
+/// Constant that layer norms add to the variance.
+constexpr float kNormEpsilon = 1e-5f;
+
 /// Size and type of contiguous activations [rows, channels]. Parameters and their gradients are f32. All arrays must
 /// begin at multiples of 16 bytes.
 struct ActivationSize {
@@ -131,7 +134,7 @@ class NetworkPasses {
                                   void* grad_x_out, float* grad_bias_sums_out, Stream stream) = 0;
   static constexpr int64_t kBiasSums = 528;
 
-  /// Computes out = GELU(layer norm of (x + bias)) over channels, without parameters, with an epsilon of 1e-5.
+  /// Computes out = GELU(layer norm of (x + bias)) over channels, without parameters, with kNormEpsilon.
   virtual void bias_norm_gelu(const ActivationSize& size, const void* x, const float* bias, void* out,
                               Stream stream) = 0;
   /// Computes the gradient of x, and partial sums [num_norm_sums(rows, 1), channels] of the bias's gradient.
@@ -139,7 +142,7 @@ class NetworkPasses {
                                        const void* grad_out, void* grad_x_out, float* grad_bias_sums_out,
                                        Stream stream) = 0;
 
-  /// Computes out = layer norm of (x + position) over channels, with an epsilon of 1e-5. position: [period, channels],
+  /// Computes out = layer norm of (x + position) over channels, with kNormEpsilon. position: [period, channels],
   /// where row r uses position r % period; or null with a period of 1.
   virtual void norm(const ActivationSize& size, const void* x, const void* position, int64_t period,
                     const float* weight, const float* bias, void* out, Stream stream) = 0;

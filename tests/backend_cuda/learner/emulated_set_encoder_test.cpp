@@ -75,7 +75,7 @@ struct Sets {
     }
     if (!size.has_norm) return values;
     for (const double v : values) variance += (v - mean) * (v - mean) / kChannels;
-    *inverse_deviation_out = 1 / std::sqrt(variance + cuda::kNormEpsilon);
+    *inverse_deviation_out = 1 / std::sqrt(variance + kNormEpsilon);
     for (double& v : values) v = (v - mean) * *inverse_deviation_out;
     return values;
   }
