@@ -468,8 +468,9 @@ __global__ void __launch_bounds__(BackwardMemory<kChannels>::kThreads)
       }
       __syncthreads();
     }
-    __syncthreads();  // all threads have read the tiles
+    __syncthreads();  // all threads have read num_tiles
   }
+  __syncthreads();  // in blocks without sets, warps have cleared their tiles
 
   const int width = static_cast<int>(size.members.width());
   const int64_t block = blockIdx.x;

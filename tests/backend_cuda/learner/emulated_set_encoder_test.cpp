@@ -17,7 +17,8 @@ namespace pictura {
 
 namespace cuda::set_encoder {
 // Shared memory of the running block.
-alignas(16) unsigned char set_memory[232448];
+alignas(16) unsigned char set_memory[sizeof(BackwardMemory<128>)];
+static_assert(sizeof(ForwardMemory<128>) <= sizeof(BackwardMemory<128>));
 }  // namespace cuda::set_encoder
 
 namespace {
@@ -106,13 +107,12 @@ void expect_sums(const Numbers& of_blocks, const std::vector<double>& expected, 
 
 template <int kChannels>
 void expect_as_in_double(bool has_norm) {
-  constexpr int kThreads = cuda::set_encoder::kWarps<kChannels> * 32;
   constexpr unsigned kBlocks = 2;
   constexpr size_t kOutputs = Sets<kChannels>::kSets * kChannels;
   const Sets<kChannels> sets(has_norm);
   std::vector<cuda::Half> out(kOutputs), grads(kOutputs);
   std::vector<uint8_t> which(kOutputs);
-  launch(kThreads, kBlocks, [&] {
+  launch(cuda::set_encoder::ForwardMemory<kChannels>::kThreads, kBlocks, [&] {
     cuda::set_encoder::largest_embedding<kChannels>(sets.size, sets.members.data(), sets.counts.data(),
                                                     sets.parameters(), out.data(), which.data());
   });
@@ -121,7 +121,7 @@ void expect_as_in_double(bool has_norm) {
   const auto width = static_cast<size_t>(sets.width);
   Numbers hidden_weight(kBlocks * kChannels * width), hidden_bias(kBlocks * kChannels),
       weight(kBlocks * kChannels * kChannels), bias(kBlocks * kChannels);
-  launch(kThreads, kBlocks, [&] {
+  launch(cuda::set_encoder::BackwardMemory<kChannels>::kThreads, kBlocks, [&] {
     cuda::set_encoder::largest_embedding_backward<kChannels>(
         sets.size, sets.members.data(), sets.parameters(), which.data(), grads.data(),
         {hidden_weight.data(), hidden_bias.data(), weight.data(), bias.data()});
