@@ -18,6 +18,7 @@ struct PolicySection {
   bool auxiliary = false;
   // Space to depth: each patch of pixels becomes one pixel with all channels.
   int patch_px = 4;
+  static constexpr int kMaxConvChannels = 4096;
   std::vector<int> conv_channels{64, 64, 128, 128, 128};
   std::vector<int> conv_kernels{1, 3, 3, 3, 3};
   std::vector<int> conv_strides{1, 1, 2, 1, 1};

@@ -82,7 +82,7 @@ void visit(AnyConfig& c, Visitor&& v) {
   v.value(NamedKey{"policy.backbone", Resume::free, Evaluation::replaced}, c.policy.backbone);
   v.value(NamedKey{"policy.backbone_frozen", Evaluation::replaced}, c.policy.backbone_frozen);
   v.value("policy.patch_px", c.policy.patch_px, 1, kMaxPatch_px);
-  v.integers("policy.conv_channels", c.policy.conv_channels, 1, 4096);
+  v.integers("policy.conv_channels", c.policy.conv_channels, 1, PolicySection::kMaxConvChannels);
   v.integers("policy.conv_kernels", c.policy.conv_kernels, 1, 31);
   v.integers("policy.conv_strides", c.policy.conv_strides, 1, 16);
   v.value("policy.num_queries", c.policy.num_queries, 1, 4096);

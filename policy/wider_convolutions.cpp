@@ -52,7 +52,7 @@ StoredTensor repeated_channels(const StoredTensor& weight, int64_t out_copies, i
 bool can_widen(const std::vector<int>& from, const std::vector<int>& to) {
   if (to.size() != from.size() || to.back() != from.back()) return false;
   for (size_t i = 0; i < to.size(); ++i) {
-    if (to[i] < from[i] || to[i] % from[i] != 0) return false;
+    if (to[i] < from[i] || to[i] > PolicySection::kMaxConvChannels || to[i] % from[i] != 0) return false;
   }
   return true;
 }
@@ -63,8 +63,8 @@ StoredPolicy widened_policy(const StoredPolicy& policy, const std::vector<int>& 
   check_has_convolutions(policy, "channels");
   const std::vector<int>& before = policy.config.policy.conv_channels;
   if (!can_widen(before, channels)) {
-    fail_usage("{}: channels: expected multiples of {}, and the last one unchanged, got {}", policy.path,
-               fmt::join(before, ", "), fmt::join(channels, ", "));
+    fail_usage("{}: channels: expected multiples of {}, up to {}, and the last one unchanged, got {}", policy.path,
+               fmt::join(before, ", "), PolicySection::kMaxConvChannels, fmt::join(channels, ", "));
   }
   StoredPolicy result = policy;
   result.config.policy.conv_channels = channels;

@@ -92,8 +92,9 @@ TEST_F(WiderConvolutions, KeepTheOutputs) {
 TEST_F(WiderConvolutions, RefuseOtherChannels) {
   write(config(false));
   const auto refusal = [this](const std::vector<int>& channels) { return message_of([&] { widened(channels); }); };
-  for (const std::vector<int>& channels : {std::vector{16, 8}, {16, 6, 8}, {4, 4, 8}, {8, 4, 16}}) {
-    EXPECT_THAT(refusal(channels), HasSubstr("channels: expected multiples of 8, 4, 8, and the last one unchanged"));
+  for (const std::vector<int>& channels : {std::vector{16, 8}, {16, 6, 8}, {4, 4, 8}, {8, 4, 16}, {8192, 4, 8}}) {
+    EXPECT_THAT(refusal(channels),
+                HasSubstr("channels: expected multiples of 8, 4, 8, up to 4096, and the last one unchanged"));
   }
   Config vector = config(false);
   vector.policy.modality = Modality::vector;
