@@ -31,7 +31,8 @@ void add_export_command(CLI::App& app) {
   command
       ->add_option("--channels", arguments->channels,
                    "New channels of the convolutions, separated by commas, multiples of the policy's, the last one "
-                   "unchanged; outputs are equal until the policy learns; default: unchanged")
+                   "unchanged; outputs are equal, up to the rounding of --weights, until the policy learns; default: "
+                   "unchanged")
       ->delimiter(',')
       ->check(CLI::PositiveNumber)
       ->allow_extra_args(false);
@@ -47,7 +48,8 @@ void add_export_command(CLI::App& app) {
       "  pictura export runs/town01/checkpoint.ckpt --weights f32 --out town01.safetensors\n"
       "  pictura export runs/town01/checkpoint.ckpt --average --out town01_average.safetensors\n"
       "  pictura export runs/demo/checkpoint.ckpt --size 96x54 --out demo_96x54.safetensors\n"
-      "  pictura export models/perspective.safetensors --channels 128,128,256,256,128 --out wide.safetensors\n"
+      "  pictura export models/perspective.safetensors --channels 128,128,256,256,128 --weights f32 --out "
+      "wide.safetensors\n"
       "  pictura simulate Town01 --policy town01.safetensors --video drive.mp4");
   command->callback([arguments] {
     ExportOptions options{.commit = PICTURA_COMMIT, .average = arguments->average};
