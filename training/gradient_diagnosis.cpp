@@ -14,22 +14,21 @@ void GradientDiagnosis::measure(const Minibatch& first, const Minibatches& minib
                           std::min({kMaxDiagnosed, config.forward_chunk, first.global_size}));
   const at::Tensor rows = first.rows.narrow(0, 0, minibatches.count_own_among_first(num_diagnosed));
   const at::Tensor& gradient = learner.optimizer->gradients();
-  at::Tensor gradients = at::zeros({3, gradient.numel()}, gradient.options());
+  // For each loss: sum of its gradients, then the number of transitions, so that ranks add both at once.
+  const at::Tensor sums = at::zeros({3, gradient.numel() + 1}, gradient.options());
+  sums.select(1, -1).fill_(rows.size(0));
   // There is a single chunk, or none if all transitions belong to other ranks.
   for_each_chunk(rows, {config.forward_chunk}, [&](const Chunk& chunk) {
     const Losses losses = learner.runner->losses(first.part(chunk), loss);
     const PhaseTimer::Scope timed(learner.timer, Phase::diagnose);
-    const auto gradient_of = [&](const at::Tensor& single_loss) {
-      single_loss.backward(/*gradient=*/{}, /*retain_graph=*/true);
-      const at::Tensor result = gradient.clone();
+    const at::Tensor single_losses[] = {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy};
+    for (int64_t i = 0; i < 3; ++i) {
+      single_losses[i].backward(/*gradient=*/{}, /*retain_graph=*/true);
+      sums[i].narrow(0, 0, gradient.numel()).copy_(gradient).mul_(rows.size(0));
       learner.optimizer->clear_gradients();
-      return result;
-    };
-    gradients = at::stack({gradient_of(losses.policy), gradient_of(config.vf_coef * losses.value),
-                           gradient_of(config.ent_coef * losses.entropy)});
+    }
   });
   const PhaseTimer::Scope timed(learner.timer, Phase::diagnose);
-  const at::Tensor sums = at::constant_pad_nd(gradients, {0, 1}, 1) * rows.size(0);
   learner.communicator->sum(sums);
   norms_ = (sums.slice(1, 0, -1).norm(2, {1}) / sums.select(1, -1)).to(at::kDouble);
 }

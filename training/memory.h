@@ -20,8 +20,8 @@ double estimated_bytes(const Config& config, bool keeps_images);
 /// Size of a configuration's network; does not count a backbone program (policy.backbone).
 struct NetworkSize {
   double parameters = 0;
-  /// Bytes of parameter, gradient and moments.
-  static constexpr double kBytesPerParameter = 20;
+  /// Bytes of parameter, gradient, two moments, average, and the three gradients of GradientDiagnosis.
+  static constexpr double kBytesPerParameter = 32;
   /// Estimated bytes per transition of a forward and backward pass, with the largest images of render.schedule.
   double transition_bytes = 0;
   double bytes(double transitions) const { return kBytesPerParameter * parameters + transition_bytes * transitions; }
