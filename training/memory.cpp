@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pictura/backends/make_policy_executor.h"
 #include "pictura/common/error.h"
 #include "pictura/common/image.h"
 #include "pictura/common/scene_history.h"
@@ -115,19 +116,25 @@ class LayerSum {
   double parameters_ = 0, kept_ = 0, largest_ = 0;
 };
 
+// Whether a device's memory suffices for one pass over sets; true for devices that this machine lacks.
+bool fits_set_encoder(Device device, double channels) {
+  return !cuda_unavailable_reason().empty() ||
+         make_network_passes(device)->fits_set_encoder(static_cast<int64_t>(channels));
+}
+
 void add_entity_sets(const Config& config, Device device, LayerSum* sum) {
   const double width = config.policy.embedding_width;
   for (const ObservationArray& array : kObservationArrays) {
     if (!is_set(array) || !config.reads(array.part)) continue;
     const double features = array.features + row_features_of(config.policy, array.name).count();
     const bool is_one_pass =
-        device.is_host() || (config.train.precision == Precision::bf16 &&
+        device.is_host() || (config.train.precision == Precision::bf16 && fits_set_encoder(device, width) &&
                              SetSize::supports(config.policy.embedding_width, config.policy.embedding_width,
                                                static_cast<int64_t>(features), array.rows));
     if (is_one_pass) {
-      // The features of members and the indices of the largest members are kept: see largest_embedding().
+      // The indices of the largest members are kept, and the features of members on the host: see largest_embedding().
       sum->add_parameters((features + 1) * width + (width + 1) * width);
-      sum->add_values(array.rows * features, 1);
+      if (device.is_host()) sum->add_values(array.rows * features, 1);
       sum->add_values(width, 1);
       continue;
     }
