@@ -18,7 +18,7 @@ struct AgentGroup {
 };
 
 struct AgentGroups {
-  double rest_share = 0;  // share of valid transitions
+  double rest_share = 0;  // share of valid transitions with new decisions
   AgentGroup rest, moving;
 };
 

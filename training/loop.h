@@ -16,7 +16,7 @@ namespace pictura {
 /// Work and wall time of one update.
 struct UpdateCost {
   int64_t agent_steps = 0, slot_steps = 0;  // steps of active agents, of all slots
-  double kept_fraction = 0;                 // share of valid transitions that the filter keeps
+  double kept_fraction = 0;                 // share of valid transitions with new decisions that the filter keeps
   int64_t minibatches = 0;
   double first_kl = 0;  // KL divergence due to rounding, before parameters change
   double rollout_s = 0, update_s = 0;

@@ -138,7 +138,7 @@ class PpoUpdate {
     rollout_.compute_advantages(config_.gamma, config_.gae_lambda, learner_.executor);
     advantages_ = rollout_.advantages.flatten();
     values_ = rollout_.values.narrow(0, 0, rollout_.num_steps()).flatten();
-    valid_ = rollout_.decisions().flatten();
+    decisions_ = rollout_.decisions().flatten();
     targets_ = {rollout_.actions.flatten().to(at::kLong), rollout_.log_probs.flatten(), advantages_ + values_};
     if (rollout_.teacher_scene.defined()) targets_.teacher_scene = rollout_.teacher_scene.flatten(0, 1);
     if (key_.teacher_weight <= 0) return;
@@ -158,10 +158,11 @@ class PpoUpdate {
     stats_.adv_threshold = static_cast<double>(threshold);
     const at::Tensor kept_and_unused = at::empty_like(advantages_, at::kLong);
     const int64_t num_kept =
-        learner_.executor->select_kept(span_of<const float>(advantages_), span_of<const uint8_t>(valid_), threshold,
+        learner_.executor->select_kept(span_of<const float>(advantages_), span_of<const uint8_t>(decisions_), threshold,
                                        span_of<int64_t>(kept_and_unused), current_stream(learner_.executor->device()));
     if (!count_kept(num_kept)) return kept_and_unused.narrow(0, 0, 0);
-    return takes_all() ? at::arange(valid_.size(0), kept_and_unused.options()) : kept_and_unused.narrow(0, 0, num_kept);
+    return takes_all() ? at::arange(decisions_.size(0), kept_and_unused.options())
+                       : kept_and_unused.narrow(0, 0, num_kept);
   }
   bool takes_all() const { return config_.halted_slots == HaltedSlots::draw; }
 
@@ -177,7 +178,7 @@ class PpoUpdate {
   // the device.
   float quantile_of_advantages() const {
     const at::Tensor counts = at::zeros({kNumFilterBins}, advantages_.options().dtype(at::kLong));
-    learner_.executor->count_advantages(span_of<const float>(advantages_), span_of<const uint8_t>(valid_),
+    learner_.executor->count_advantages(span_of<const float>(advantages_), span_of<const uint8_t>(decisions_),
                                         span_of<int64_t>(counts), current_stream(learner_.executor->device()));
     learner_.communicator->sum(counts);
     const at::Tensor host = counts.cpu();
@@ -186,11 +187,11 @@ class PpoUpdate {
                                       : filter_quantile(of_bins, config_.adv_filter_quantile);
   }
 
-  // Stores the fraction of all ranks' valid transitions that the filter kept, and the fraction of their returns'
-  // variance that the values explain: 1 for a perfect critic, 0 for a constant. Returns false if no transition was
-  // kept. Waits for the device.
+  // Stores the fraction of all ranks' valid transitions with new decisions that the filter kept, and the fraction of
+  // their returns' variance that the values explain: 1 for a perfect critic, 0 for a constant. Returns false if no
+  // transition was kept. Waits for the device.
   bool count_kept(int64_t num_kept) {
-    const at::Tensor valid = at::nonzero(valid_).squeeze(1),
+    const at::Tensor valid = at::nonzero(decisions_).squeeze(1),
                      returns = targets_.returns.index_select(0, valid).to(at::kDouble),
                      errors = returns - values_.index_select(0, valid);
     const at::Tensor sums = at::stack({at::full({}, num_kept, returns.options()), at::ones_like(returns).sum(),
@@ -211,8 +212,8 @@ class PpoUpdate {
   // scale of its scene loss.
   void prepare(Minibatch* minibatch) const {
     at::Tensor advantages = advantages_.index_select(0, minibatch->rows);
-    const at::Tensor valid =
-        takes_all() ? valid_.index_select(0, minibatch->rows).to(at::kDouble) : at::ones_like(advantages, at::kDouble);
+    const at::Tensor valid = takes_all() ? decisions_.index_select(0, minibatch->rows).to(at::kDouble)
+                                         : at::ones_like(advantages, at::kDouble);
     const at::Tensor sums = at::stack({valid.sum(), (valid * advantages).sum(), (valid * advantages.square()).sum()});
     learner_.communicator->sum(sums);
     const at::Tensor count = sums[0].clamp_min(1), mean = sums[1] / count;
@@ -330,7 +331,7 @@ class PpoUpdate {
   const LossFunction loss_ = [this](const Policy::Output& output, const Targets& targets, const Minibatch& chunk) {
     return ppo_losses(output, targets, chunk, config_);
   };
-  at::Tensor advantages_, values_, valid_;  // [steps * slots]
+  at::Tensor advantages_, values_, decisions_;  // [steps * slots]
   Targets targets_;
   at::Tensor sums_;        // f64 [epochs + 1, kNumLossStats], sums over minibatches; the last row: the first minibatch
   at::Tensor num_failed_;  // f32 scalar, number of minibatches that took no step
