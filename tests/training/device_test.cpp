@@ -276,12 +276,6 @@ TEST_F(DeviceTraining, TakeoversAtCornersStartAsOnTheHost) {
   EXPECT_GT(alike, on_host.takeovers.size() * 9 / 10) << "after half a second";
 }
 
-bool equal(const std::vector<NamedTensor>& a, const std::vector<NamedTensor>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const NamedTensor& x, const NamedTensor& y) {
-    return x.name == y.name && x.value.equal(y.value);
-  });
-}
-
 class MuonOnADevice : public test::DeviceTest {
  protected:
   void SetUp() override {
@@ -367,9 +361,9 @@ TEST_P(EachModality, HostAndDeviceResumeEachOthersRuns) {
     EXPECT_EQ(same.agent_steps, half.agent_steps);
     EXPECT_EQ(same.km_driven, half.km_driven);
     const Checkpoint again = read_checkpoint(half.checkpoint);
-    EXPECT_TRUE(equal(again.parameters, saved.parameters));
-    EXPECT_TRUE(equal(again.first_moments, saved.first_moments));
-    EXPECT_TRUE(equal(again.second_moments, saved.second_moments));
+    EXPECT_TRUE(test::are_equal(again.parameters, saved.parameters));
+    EXPECT_TRUE(test::are_equal(again.first_moments, saved.first_moments));
+    EXPECT_TRUE(test::are_equal(again.second_moments, saved.second_moments));
     EXPECT_EQ(again.simulator, saved.simulator);
     EXPECT_EQ(again.adam_steps, saved.adam_steps);
     EXPECT_EQ(again.filter_average, saved.filter_average);
