@@ -162,7 +162,7 @@ void find_crossing_junctions(LanePredicate is_wanted, float bridged_m,
     if (!lane.in_junction) continue;
     const int32_t first = first_of(static_cast<int32_t>(i));
     const auto [junction, is_new] = junctions.emplace(first, static_cast<int32_t>(map.junctions.size()));
-    if (is_new) map.junctions.push_back({.name = map.road_names[first]});
+    if (is_new) map.junctions.push_back({.name = map.road_names[map.lanes[first].source_road]});
     lane.junction = junction->second;
   }
 }

@@ -458,6 +458,23 @@ OsmText crossing(bool inner_lanes_refer = false, bool has_stop_lines = true, con
   return text;
 }
 
+TEST(Lanelet2, JunctionsOfTwoWayLaneletsHaveALaneletsName) {
+  OsmText text;
+  const auto lanelet = [&text](int id, double x, double y, double dx, double dy) {
+    const double length = std::hypot(dx, dy), left_x = -2 * dy / length, left_y = 2 * dx / length;
+    text.node(10 * id, x + left_x, y + left_y).node(10 * id + 1, x + dx + left_x, y + dy + left_y);
+    text.node(10 * id + 2, x - left_x, y - left_y).node(10 * id + 3, x + dx - left_x, y + dy - left_y);
+    text.way(10 * id + 4, {10 * id, 10 * id + 1}).way(10 * id + 5, {10 * id + 2, 10 * id + 3});
+    text.lanelet(id, 10 * id + 4, 10 * id + 5, {{"one_way", "no"}});
+  };
+  for (int id = 101; id <= 110; ++id) lanelet(id, 0, 50.0 * (id - 100), 30, 0);
+  lanelet(111, 100, 0, 40, 0);
+  lanelet(112, 120, -20, 0, 40);
+  const RoadMap map = import(text);
+  ASSERT_EQ(map.junctions.size(), 1u);
+  EXPECT_EQ(map.junctions[0].name, "111");
+}
+
 TEST(Lanelet2, LightsHaveStopLinesHeadsLanesAndPhases) {
   for (const bool inner_lanes_refer : {false, true}) {
     const RoadMap map = sound(crossing(inner_lanes_refer));
