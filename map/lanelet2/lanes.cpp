@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <string>
 
 #include "pictura/common/error.h"
@@ -208,10 +209,11 @@ class LaneBuilder {
     lanelet->road = static_cast<int32_t>(map_.road_names.size());
     map_.road_names.push_back(std::to_string(relation.id));
     const LaneType type = type_of(relation);
-    lanelet->lane = add_lane(*lanelet, type, points, false);
+    const double limit_mps = speed_limit_mps(relation);
+    lanelet->lane = add_lane(*lanelet, type, limit_mps, points, false);
     if (type == LaneType::driving && is_two_way(relation.tags)) {
       std::reverse(points.begin(), points.end());
-      lanelet->back = add_lane(*lanelet, type, points, true);
+      lanelet->back = add_lane(*lanelet, type, limit_mps, points, true);
     }
     if (!is_drivable(type)) return;
     build_.bands.push_back(std::move(band));
@@ -248,11 +250,12 @@ class LaneBuilder {
     return false;
   }
 
-  int32_t add_lane(const Lanelet& lanelet, LaneType type, const std::vector<CurvePoint>& points, bool is_back) {
+  int32_t add_lane(const Lanelet& lanelet, LaneType type, double limit_mps, const std::vector<CurvePoint>& points,
+                   bool is_back) {
     const Relation& relation = build_.relation_of(lanelet);
     Lane lane{.type = type};
     lane.in_junction = type == LaneType::driving && relation.tags.has("turn_direction");  // tag of Autoware
-    lane.speed_limit_mps = static_cast<float>(speed_limit_mps(relation));
+    lane.speed_limit_mps = static_cast<float>(limit_mps);
     lane.source_road = lanelet.road;
     lane.source_lane = is_back ? -1 : 1;
     append_lane_points(points, &map_, &lane);
@@ -265,7 +268,7 @@ class LaneBuilder {
 
   /// Returns the speed limit of a regulatory element if there is one, else of the lanelet's tags, else of its subtype
   /// and location.
-  double speed_limit_mps(const Relation& relation) const {
+  double speed_limit_mps(const Relation& relation) {
     for (const int32_t index : relation.relations("regulatory_element")) {
       const Relation& rule = file_.relations[index];
       if (rule.tags.of("subtype") != "speed_limit" || rule.tags.flag("dynamic") == true) continue;
@@ -275,6 +278,7 @@ class LaneBuilder {
         if (stated.empty()) stated = file_.ways[way].tags.of("subtype");
       }
       if (const std::optional<double> mps = speed_of_sign_mps(stated)) return *mps;
+      if (!unreadable_rules_.insert(index).second) continue;  // recorded for another lanelet
       file_.where(rule).record_repair(build_.faults, RepairKind::unreadable_speed,
                                       "expected a speed limit like '50 km/h', got '{}'", stated);
     }
@@ -377,6 +381,7 @@ class LaneBuilder {
   Build& build_;
   RoadMap& map_;
   const OsmFile& file_;
+  std::set<int32_t> unreadable_rules_;  // speed limits that are already recorded
 };
 
 }  // namespace
@@ -441,8 +446,10 @@ void find_lanelets(Build* build) {
     const auto is_line = [&](int32_t way) { return file.ways[way].nodes.size() >= 2; };
     if (left.size() != 1 || right.size() != 1 || !is_line(left[0]) || !is_line(right[0])) {
       file.where(relation).record_repair(build->faults, RepairKind::borderless_lanelet,
-                                         "expected one left and one right border of two points, got {} and {}",
-                                         left.size(), right.size());
+                                         "expected one left and one right border, each of at least two points, got {} "
+                                         "and {}, of which {} and {} have two points",
+                                         left.size(), right.size(), std::count_if(left.begin(), left.end(), is_line),
+                                         std::count_if(right.begin(), right.end(), is_line));
       continue;
     }
     Lanelet lanelet{.relation = static_cast<int32_t>(i), .left = {left[0]}, .right = {right[0]}};

@@ -724,6 +724,14 @@ TEST(Lanelet2, FaultsWithOneMeaningAreRepaired) {
   EXPECT_EQ(repaired(street({{"subtype", "canal"}}), RepairKind::unknown_subtype).lanes[0].type, LaneType::other);
   EXPECT_FLOAT_EQ(repaired(street({{"speed_limit", "fast"}}), RepairKind::unreadable_speed).lanes[0].speed_limit_mps,
                   50 / 3.6f);
+  // Once for both lanes of a two-way lanelet, and once for a rule of several lanelets.
+  repaired(street({{"speed_limit", "fast"}, {"one_way", "no"}}), RepairKind::unreadable_speed);
+  repaired(with([](OsmText* text) {
+             text->relation(30, {},
+                            {{"type", "regulatory_element"}, {"subtype", "speed_limit"}, {"sign_type", "fast"}});
+             text->lanelet(21, 11, 12, {}, {30}).lanelet(22, 11, 12, {}, {30});
+           }),
+           RepairKind::unreadable_speed);
   repaired(street({}, {{"type", "line_thin"}, {"subtype", "solid"}, {"color", "pink"}}), RepairKind::unknown_color);
   repaired(with([](OsmText* text) { text->way(30, {1, 2}, {{"type", "parking_space"}}); }),
            RepairKind::shapeless_object);
