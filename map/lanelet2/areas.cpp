@@ -94,7 +94,9 @@ class AreaBuilder {
       const std::string_view type = relation.tags.of("type");
       if ((type != "multipolygon" && type != "area") || !is_drivable_area(relation.tags)) continue;
       build_.budget.work().check();
-      for (const Points& ring : rings_of(relation, "outer")) add_surface(ring, relation);
+      bool has_surface = false;
+      for (const Points& ring : rings_of(relation, "outer")) has_surface |= add_surface(ring, relation);
+      if (!has_surface) continue;
       for (Points ring : rings_of(relation, "inner")) add_hole(&ring);
     }
     // Parking lots of Autoware's maps are closed without a repeated point.
@@ -119,7 +121,7 @@ class AreaBuilder {
     return ring;
   }
 
-  /// Joins the ways with a role at shared points, and returns the resulting rings.
+  /// Joins the ways with a role at shared points, and returns the closed rings. Records a fault for each other ring.
   std::vector<Points> rings_of(const Relation& relation, std::string_view role) {
     std::vector<int32_t> ways = relation.ways(role);
     std::erase_if(ways, [&](int32_t way) { return file_.ways[way].nodes.size() < 2; });
@@ -135,17 +137,17 @@ class AreaBuilder {
           return build_.first_node({way, false}) == build_.last_node(at) ||
                  build_.last_node({way, false}) == build_.last_node(at);
         });
-        if (next == ways.end()) {
-          record_fault(relation);
-          return rings;
-        }
+        if (next == ways.end()) break;
         at = {*next, build_.first_node({*next, false}) != build_.last_node(at)};
         ways.erase(next);
         const Points more = build_.points_of(at);
         ring.insert(ring.end(), more.begin() + 1, more.end());
       }
       ring = without_repeated(std::move(ring));
-      if (ring.size() >= 3) rings.push_back(std::move(ring));
+      if (build_.last_node(at) == first && ring.size() >= 3)
+        rings.push_back(std::move(ring));
+      else
+        record_fault(relation);
     }
     return rings;
   }
@@ -156,15 +158,20 @@ class AreaBuilder {
                                     "expected a closed outline that does not cross itself");
   }
 
+  /// Returns whether the ring is an outline.
   template <typename Item>
-  void add_surface(const Points& ring, const Item& item) {
+  bool add_surface(const Points& ring, const Item& item) {
     const auto triangles = ring.size() < 3 ? std::nullopt : triangulate(ring, &build_.budget);
-    if (!triangles) return record_fault(item);
+    if (!triangles) {
+      record_fault(item);
+      return false;
+    }
     for (const auto& [a, b, c] : *triangles) {
       // A triangle is stored as a quad with a corner in the middle of a side.
       build_.bands.push_back({{ring[a], ring[c]}, {0.5 * (ring[a] + ring[b]), ring[b]}});
       build_.band_roads.push_back(-1);
     }
+    return true;
   }
 
   /// Adds the edges of a hole. The surface around the hole is on the right of a counter-clockwise ring.
