@@ -90,7 +90,7 @@ class Painter {
     const double length_m = plan_length_m(line);
     const std::vector<std::pair<double, double>> stated = stated_dashes(stripe.way);
     for (const auto& [begin, end] : stated) {
-      build_.budget.count_sample();
+      build_.count_work(line.size());  // a pass over the whole line
       add_marking(stripe, part_of(line, begin * length_m, end * length_m), true);
     }
     if (!stated.empty()) return;
