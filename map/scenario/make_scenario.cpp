@@ -151,6 +151,12 @@ void make_tracks(Conversion* conversion) {
       }
       Eigen::Vector3d p = conversion->rounded(conversion->from_origin(state.center_m));
       check_radius(*conversion, fmt::format("{}: step {}", place, step), p);
+      for (const auto& [field, mps] :
+           {std::pair{"velocity_x", state.velocity_x_mps}, std::pair{"velocity_y", state.velocity_y_mps}}) {
+        PICTURA_CHECK(std::abs(mps) <= double{kMaxScenarioRadius_m},
+                      "{}: {}: step {}: {}: expected a number of at most {} in magnitude, got {}", scene.source, place,
+                      step, field, kMaxScenarioRadius_m, mps);
+      }
       // Recorded sizes vary along a track, so the bottom face is half of the current step's height below the centre.
       if (!scene.is_authored) p.z() -= 0.5 * (state.height_m > 0 ? state.height_m : its_size.height_m);
       out.states.push_back({to_vec3(p),
