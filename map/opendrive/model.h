@@ -218,6 +218,7 @@ struct FileRoad {
   Profile left_crossfall, right_crossfall;  // rad; positive: down from the reference line
   std::vector<CrossSection> shape;          // sorted by s; heights between them are interpolated
   std::vector<FileSection> sections;
+  std::size_t num_copied_records = 0;  // see continue_lanes()
   std::vector<FileObject> objects;
   std::vector<FileSignal> signals;
   std::vector<SignalReference> signal_references;

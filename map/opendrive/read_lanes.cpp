@@ -214,6 +214,8 @@ void read_side(const Element& section, const char* side, int sign, double sectio
 struct SectionElement {
   double s = 0;
   Element element;
+  bool is_single_sided = false;
+  double lanes_end = 0;  // start of the next section that is not single-sided
 };
 
 std::vector<SectionElement> section_elements(const Element& lanes, double road_length) {
@@ -231,12 +233,20 @@ std::vector<SectionElement> section_elements(const Element& lanes, double road_l
     first.element.record_repair(RepairKind::late_section, kMessage, first.s);
     first.s = 0;
   }
-  for (SectionElement& section : sections) section.s = std::clamp(section.s, 0.0, road_length);
+  double lanes_end = road_length;
+  for (std::size_t i = sections.size(); i-- > 0;) {
+    SectionElement& section = sections[i];
+    section.s = std::clamp(section.s, 0.0, road_length);
+    section.lanes_end = lanes_end;
+    section.is_single_sided = section.element.flag("singleSide");
+    if (!section.is_single_sided) lanes_end = section.s;
+  }
   return sections;
 }
 
-/// Reads the sections. A singleSide section defines the lanes of one side; the lanes of the other side continue.
-std::vector<FileSection> read_sections(const Element& lanes, double road_length) {
+/// Reads the sections, and counts as continue_lanes() does. A singleSide section defines the lanes of one side; the
+/// lanes of the other side continue.
+std::vector<FileSection> read_sections(const Element& lanes, double road_length, std::size_t* copied_inout) {
   const std::vector<SectionElement> elements = section_elements(lanes, road_length);
   std::vector<FileSection> sections;
   for (std::size_t i = 0; i < elements.size(); ++i) {
@@ -245,16 +255,14 @@ std::vector<FileSection> read_sections(const Element& lanes, double road_length)
     section.where = element.where();
     section.s = elements[i].s;
     section.end = i + 1 < elements.size() ? elements[i + 1].s : road_length;
-    std::size_t both_sided = i + 1;
-    while (both_sided < elements.size() && elements[both_sided].element.flag("singleSide")) ++both_sided;
-    const double lanes_end = both_sided < elements.size() ? elements[both_sided].s : road_length;
-    const double length = std::max(lanes_end, section.end) - section.s;
+    const double length = std::max(elements[i].lanes_end, section.end) - section.s;
     read_side(element, "left", 1, length, &section.left);
     read_side(element, "right", -1, length, &section.right);
-    if (i > 0 && element.flag("singleSide")) {
+    if (i > 0 && elements[i].is_single_sided) {
       FileSection& before = sections.back();
-      if (section.left.empty()) section.left = continue_lanes(&before.left, section.s - before.s);
-      if (section.right.empty()) section.right = continue_lanes(&before.right, section.s - before.s);
+      const double ds = section.s - before.s;
+      if (section.left.empty()) section.left = continue_lanes(&before.left, ds, copied_inout);
+      if (section.right.empty()) section.right = continue_lanes(&before.right, ds, copied_inout);
     }
     for (std::vector<FileLane>* side : {&section.left, &section.right}) {
       for (FileLane& lane : *side) lane.section = lane.is_continued ? lane.section : static_cast<int>(i);
@@ -272,7 +280,7 @@ std::vector<FileSection> read_sections(const Element& lanes, double road_length)
 void read_lanes(const Element& road_element, Faults* faults, FileRoad* road) {
   const Element lanes = road_element.required_child("lanes");
   road->lane_offset = read_profile(lanes, "laneOffset", "s", road->length);
-  road->sections = read_sections(lanes, road->length);
+  road->sections = read_sections(lanes, road->length, &road->num_copied_records);
   for (std::size_t i = road->sections.size(); i-- > 0;) {
     const FileSection& section = road->sections[i];
     const double length = section.end - section.s;

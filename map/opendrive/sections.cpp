@@ -35,6 +35,11 @@ FileLane continue_lane(const FileLane& lane, double ds) {
   return rest;
 }
 
+std::size_t num_records(const FileLane& lane) {
+  return lane.marks.size() + lane.width.cubics.size() + lane.border.cubics.size() + lane.inner_height.cubics.size() +
+         lane.outer_height.cubics.size() + lane.speed_limit_mps.cubics.size();
+}
+
 /// Returns the stations of speed limit changes, sorted.
 std::vector<double> speed_changes(const FileRoad& road, const FileSection& section) {
   std::vector<double> changes;
@@ -131,9 +136,15 @@ void hold_profiles(double s, FileRoad* road) {
   }
 }
 
-std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds) {
+std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds, std::size_t* copied_inout) {
+  constexpr std::size_t kMaxCopiedRecords = 1'000'000;
   std::vector<FileLane> rest;
   for (FileLane& lane : *lanes) {
+    *copied_inout += num_records(lane);
+    if (*copied_inout > kMaxCopiedRecords) {
+      lane.where.fail("expected at most {} records on a road's lanes that continue in later sections",
+                      kMaxCopiedRecords);
+    }
     rest.push_back(continue_lane(lane, ds));
     rest.back().predecessors = lane.successors = {lane.id};
   }
@@ -155,8 +166,8 @@ bool split_section(double s, FileRoad* road) {
   rest.s = s;
   rest.end = section.end;
   rest.center = continue_lane(section.center, ds);
-  rest.left = continue_lanes(&section.left, ds);
-  rest.right = continue_lanes(&section.right, ds);
+  rest.left = continue_lanes(&section.left, ds, &road->num_copied_records);
+  rest.right = continue_lanes(&section.right, ds, &road->num_copied_records);
   section.end = s;
   road->sections.insert(road->sections.begin() + index + 1, std::move(rest));
   return true;

@@ -3,13 +3,15 @@
 
 #include <vector>
 
+#include "pictura/common/error_types.h"
 #include "pictura/map/opendrive/model.h"
 
 namespace pictura::opendrive {
 
 /// Splits lanes at `ds` from their section's start, and links both parts. Returns the later parts, which are marked
-/// is_continued.
-std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds);
+/// is_continued. *copied_inout counts the road's records that were copied to later parts. Throws Error if there are too
+/// many, which bounds memory.
+std::vector<FileLane> continue_lanes(std::vector<FileLane>* lanes, double ds, std::size_t* copied_inout);
 
 /// Removes a section without length, and extends the previous section. Links into the removed section lead to the
 /// section beyond it. A lane offset that applies only within the removed section is removed.

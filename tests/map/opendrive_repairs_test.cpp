@@ -508,6 +508,17 @@ TEST(OpenDriveRepairs, UnknownFlagsAreFalse) {
   const RoadMap map = repaired(replaced(straight().text(), "type=\"driving\"", "type=\"driving\" level=\"none\""),
                                RepairKind::unknown_flag);
   EXPECT_EQ(difference(map, sound(straight().text())), "");
+  // Also looked up for the section before.
+  const auto section = [](const char* attributes, const char* link) {
+    return fmt::format(
+        R"(<laneSection {}><center><lane id="0" type="none"/></center><right><lane id="-1" type="driving"><link>{}</link>)"
+        R"(<width sOffset="0" a="3" b="0" c="0" d="0"/></lane></right></laneSection>)",
+        attributes, link);
+  };
+  RoadText road = straight();
+  road.sections =
+      section("s=\"0\"", "<successor id=\"-1\"/>") + section("s=\"30\" singleSide=\"yes\"", "<predecessor id=\"-1\"/>");
+  repaired(road.text(), RepairKind::unknown_flag);
 }
 
 TEST(OpenDriveRepairs, AttributesWithoutAValueAreMissing) {
