@@ -64,6 +64,9 @@ SceneRecorder::SceneRecorder(Simulator& simulator, int world)
   }
   spec_ = simulator.worlds()[world_];
   map_ = simulator.maps()[spec_.map];
+  if (map_->rules.record.first_replayed > 0) {
+    fail_usage("expected a world in which all tracks of a recorded scene are agents, got one with chosen tracks");
+  }
   seed_ = simulator.arrays().seed[world_];
   first_slot_ = simulator.slots().slot_begin[world_];
   episode_ = simulator.episode_index()[world_];
@@ -142,15 +145,21 @@ Scenario SceneRecorder::scenario(std::string id, int self_agent) const {
   for (size_t i = 0; i < bodies_.size(); ++i) {
     for (size_t life = 1; life < bodies_[i].size(); ++life) lives.emplace_back(i, life);
   }
+  // Ids of boxes that are no tracks of the recorded scene: parked cars.
+  int64_t next_id = 0;
+  for (size_t i = 0; recorded && i < recorded->tracks.size(); ++i) {
+    next_id = std::max(next_id, recorded->tracks[i].id + 1);
+  }
   for (const auto& [i, life] : lives) {
     const AgentBox& body = bodies_[i][life];
     const auto is_valid = [this, i = i, life = life](size_t step) {
       const size_t at = step * bodies_.size() + i;
       return valid_[at] && life_[at] == static_cast<int32_t>(life);
     };
+    const RecordedTrack* const of_scene = recorded && i < recorded->tracks.size() ? &recorded->tracks[i] : nullptr;
     RecordedTrack track{
-        .id = recorded ? recorded->tracks[i].id : static_cast<int64_t>(i + life * bodies_.size()),
-        .type = recorded ? recorded->tracks[i].type : type_of(body.agent_class),
+        .id = of_scene ? of_scene->id : next_id + static_cast<int64_t>(i + life * bodies_.size()),
+        .type = of_scene ? of_scene->type : type_of(body.agent_class),
         .control = static_cast<int>(i) < spec_.num_agents ? RecordedControl::unstated : RecordedControl::still,
         .length_m = body.length_m,
         .width_m = body.width_m,

@@ -12,6 +12,7 @@
 #include "pictura/simulator/controllers/inverse_actions.h"
 #include "pictura/simulator/controllers/shared_control.h"
 #include "pictura/simulator/recorded_scene.h"
+#include "pictura/simulator/scene_recorder.h"
 #include "pictura/simulator/simulator_setup.h"
 #include "pictura/tests/support/error_message.h"
 #include "pictura/tests/support/recorded_crossing.h"
@@ -119,6 +120,7 @@ TEST(RecordedWorlds, ReplayedTracksAreBoxesThatFollowTheRecord) {
   EXPECT_NE(map->fingerprint, with_tracks(*whole, driven, driven, kAgents)->fingerprint);
   const auto simulator = make_simulator("cpu", config, CompiledMaps{map}, {{0, kAgents, 0}, {0, 1, 1}});
   EXPECT_EQ(simulator->spawn_report().spawned, 2 + 1);
+  EXPECT_THAT(test::message_of<UsageError>([&] { SceneRecorder(*simulator, 0); }), HasSubstr("one with chosen tracks"));
   // Worlds of the same scene in which all tracks are agents that follow the record.
   const auto as_agents = world_of(scene, 0, {.auxiliary_observations = true});
   const std::vector<int32_t> actions(kAgents + 1, kIdleAction);
