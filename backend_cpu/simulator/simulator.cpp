@@ -67,7 +67,10 @@ class SimulatorCpu final : public Simulator {
     results_.reserve(capacity_.slots, config());
     ++generation_;
     show_arrays();
-    for_each_world([this](int w) { sort_into_cells(worlds_.world(w), &worlds_.box_cells[w]); });
+    for_each_world([this](int w) {
+      clear_results(w);  // as on a device
+      sort_into_cells(worlds_.world(w), &worlds_.box_cells[w]);
+    });
   }
 
   SpawnReport spawn_report(Stream) const override { return worlds_.state.spawn_report(worlds_.setup); }

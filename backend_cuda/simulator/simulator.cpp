@@ -149,6 +149,7 @@ class SimulatorCuda final : public Simulator {
     ++generation_;
   }
   void allocate(const SimulatorCapacity& capacity) {
+    capacity_ = {};  // until everything is allocated
     // Freed first, so that old and new memory need not fit together.
     state_ = {};
     results_ = {};
@@ -323,6 +324,7 @@ class SimulatorCuda final : public Simulator {
   }
 
   cuda::PhaseArrays phase_arrays() {
+    PICTURA_CHECK(capacity_.slots > 0, "simulator: an earlier call ran out of device memory: call set_worlds()");
     cuda::PhaseArrays arrays;
     arrays.worlds = scratch_.worlds.data();
     arrays.next_worlds = scratch_.next_worlds.data();

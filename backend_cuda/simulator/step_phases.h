@@ -196,7 +196,7 @@ void launch_step(const Launch& launch, const PhaseArrays& arrays, const CommandT
                    [&] {
                      launch.threads(arrays.num_slots, CheckCommands<CommandType>{arrays, commands});
                      launch.template groups<kThreadsPerAgent>(arrays.num_slots, Advance<CommandType>{arrays, commands});
-                     if (arrays.has_replayed_tracks) {
+                     if (arrays.has_replayed_tracks && arrays.parked_per_world > 0) {
                        launch.template groups<kThreadsPerAgent>(arrays.num_worlds * arrays.parked_per_world,
                                                                 ReplayTracks{arrays});
                      }
