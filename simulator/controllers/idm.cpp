@@ -7,6 +7,7 @@
 #include "pictura/simulator/controllers/host_controllers.h"
 #include "pictura/simulator/rules/collision.h"
 #include "pictura/simulator/rules/goal.h"
+#include "pictura/simulator/rules/record.h"
 #include "pictura/simulator/rules/world_view.h"
 
 namespace pictura {
@@ -243,6 +244,11 @@ IdmController::Front IdmController::box_ahead(const SimulatorArrays& input, size
         const int other_slot = first_slot + other_agent;
         const Vec2 its_way{input.state.cos_heading[other_slot], input.state.sin_heading[other_slot]};
         front.speed_mps = std::max(0.0f, input.state.speed_mps[other_slot] * dot(its_way, {heading.cos, heading.sin}));
+      } else if (has_replayed_tracks(views_[world])) {
+        const int replayed = other_agent - (input.slots.slot_begin[world + 1] - first_slot);
+        const float its_mps = replayed_state(views_[world], replayed, input.episode_step[world]).speed_mps;
+        const Vec2 its_way{other.cos_heading, other.sin_heading};
+        front.speed_mps = std::max(0.0f, its_mps * dot(its_way, {heading.cos, heading.sin}));
       }
       return front;
     }
