@@ -45,6 +45,7 @@ struct TorchSession final : SessionParts {
 
   void evaluate(const PolicyInput& input, Renderer* renderer, Span<float> logits_out,
                 Span<float> values_out) const override {
+    const c10::OptionalStreamGuard guard(torch_stream({}, device));
     const auto batch = static_cast<int64_t>(values_out.size());
     const at::Tensor all = at::arange(batch, at::TensorOptions(at::kLong).device(torch_device(device)));
     const Decision decision = decide(input, batch, all, renderer);
