@@ -126,7 +126,7 @@ class Batch:
         self.live: pictura.LiveView | None = None
         self.renderer, self._images = None, None
         if observation in ("images", "both"):
-            self.renderer = pictura.Renderer(renderer, rig, device=device, num_threads=num_threads)
+            self.renderer = pictura.Renderer(renderer, rig, device=device, num_threads=num_threads, stream=options.get("stream"))
             for handle, geometry in self.simulator.geometries.items():
                 self.renderer.upload(handle, geometry)
             self._images = self.renderer.make_images(self.num_slots)
