@@ -11,6 +11,7 @@ gymnasium = pytest.importorskip("gymnasium")
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 from gymnasium.vector import AutoresetMode  # noqa: E402
 
+from pictura.envs.gymnasium_env import DriveEnv  # noqa: E402
 from pictura.envs.gymnasium_vector import AgentStatistics  # noqa: E402
 
 SMALL = {"rig": pictura.Rig.paper(16, 9)}
@@ -88,6 +89,12 @@ def test_vector_seeds_determine_all_results(autoreset):
         runs.append((np.array(rewards), seen["ego"]))
     assert (runs[0][0] == runs[1][0]).all() and (runs[0][1] == runs[1][1]).all()
     assert not (runs[0][0] == runs[2][0]).all()
+
+
+@pytest.mark.parametrize("make", [pictura.make_vec, DriveEnv])
+def test_the_seed_of_an_environment_counts_until_a_reset_with_another(make):
+    first = [make("procedural:3", observation="vector", seed=seed).reset()[0]["ego"] for seed in (5, 5, 6)]
+    assert (first[0] == first[1]).all() and not (first[0] == first[2]).all()
 
 
 def test_next_step_worlds_begin_in_the_step_after_their_end():
