@@ -293,6 +293,9 @@ def test_pettingzoo_passes_its_tests():
     env.reset(seed=1)
     with pytest.raises(pictura.Error, match="agent_"):
         env.step({})
+    for action in (7.9, 12):
+        with pytest.raises(pictura.Error, match=rf"{env.agents[0]}: expected an action of Discrete\(12\), got {action}"):
+            env.step(dict.fromkeys(env.agents, action))
 
 
 STREET = """<OpenDRIVE><header revMajor="1" revMinor="6"/><road id="1" junction="-1" length="60"><link/>

@@ -302,7 +302,10 @@ class OtherDrivers:
         """Advances the simulator by one step. The agent of `slot` executes `action`; the driver controls the others."""
         batch = self._batch
         if self._policy is not None:
-            actions = np.array(self._policy(batch.observe(copy=False)), np.int32)
+            told = np.asarray(self._policy(batch.observe(copy=False)))
+            if told.dtype.kind not in "iu":
+                raise pictura.Error(f"others: expected integers from the function, got {told.dtype}")
+            actions = told.astype(np.int32)
             actions[slot] = action
             return batch.results(batch.simulator.step(actions))
         commands = self._controller.act(batch.simulator)

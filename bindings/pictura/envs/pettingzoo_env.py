@@ -84,7 +84,7 @@ class DriveParallelEnv(ParallelEnv):
         """Advances the world by one step. actions: dict from each live agent's name to its action.
 
         Returns (observations, rewards, terminations, truncations, infos) of the agents that acted or entered. Raises
-        pictura.Error if the action of a live agent is missing.
+        pictura.Error if the action of a live agent is missing or outside its action space.
         """
         acting = self.agents
         missing = [agent for agent in acting if agent not in actions]
@@ -95,7 +95,10 @@ class DriveParallelEnv(ParallelEnv):
         slots = {agent: self._slot(agent) for agent in acting}
         told = np.array([idle] * len(self.possible_agents))
         for agent, slot in slots.items():
-            told[slot] = actions[agent]
+            action = np.asarray(actions[agent])
+            if not self.action_space(agent).contains(action[()]):
+                raise pictura.Error(f"step: {agent}: expected an action of {self.action_space(agent)}, got {actions[agent]!r}")
+            told[slot] = action
         results = self.batch.step(told)
         rewards = {agent: float(results["reward"][slot]) for agent, slot in slots.items()}
         terminations = {agent: bool(results["terminated"][slot]) for agent, slot in slots.items()}
