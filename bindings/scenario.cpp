@@ -162,7 +162,8 @@ py::dict world_of(const RecordedScene& scene, const py::kwargs& options) {
   d["reset_inactive_fraction"] = config.reset_inactive_fraction;
   d["parked_cars"] = config.parked_cars;
   d["walls"] = config.walls;
-  py::dict conditioning(d.contains("conditioning") ? d["conditioning"] : py::dict());
+  py::dict conditioning;
+  if (d.contains("conditioning")) conditioning.attr("update")(d["conditioning"]);  // a copy, not the caller's dict
   for (const Conditioning which : {Conditioning::throttle, Conditioning::steer, Conditioning::acceleration}) {
     conditioning[kConditioningNames[static_cast<size_t>(which)]] = config.conditioning[static_cast<size_t>(which)].low;
   }

@@ -166,6 +166,9 @@ def test_worlds_mix_scenes_and_options_are_kept(scene):
     options = scene.world(conditioning={"delta_goal_m": 3.0, "throttle": 0.5}, seed=4)
     assert options["conditioning"]["delta_goal_m"] == 3.0 and options["conditioning"]["throttle"] == 1
     assert options["seed"] == 4 and options["episode_steps"] == 90 and not options["walls"]
+    own = {"delta_goal_m": 3.0}
+    scene.world(conditioning=own)
+    assert own == {"delta_goal_m": 3.0}, "the caller's dict"
     late = scene.starting_at(30)
     simulator = pictura.Simulator([scene, late], [(0, 12), (1, 12)], num_threads=1, **options)
     simulator.run(pictura.Controller("log", simulator), 5)
