@@ -24,7 +24,8 @@ except ImportError as error:
 _CLASSES = ("vehicle", "cyclist", "pedestrian")
 _COLORS = np.array([[60, 140, 255], [255, 160, 40], [60, 200, 120]], np.uint8)
 _HALTED = np.array([150, 150, 150], np.uint8)
-_STATUS_HALTED, _STATUS_ABSENT = 1, 3
+_STATUS_HALTED = 1
+_STATUSES_WITHOUT_BODY = (3, 5)  # absent, waiting
 
 
 def log_map(road: pictura.Map, entity: str = "world/map", recording: Any = None) -> None:
@@ -64,7 +65,7 @@ def log_world(simulator: pictura.Simulator, time_s: float, world: int = 0, entit
             f"log_world: expected a world of 0 to {simulator.num_worlds - 1} on cpu, got {world} on {simulator.device}"
         )
     state = {name: array.numpy() for name, array in simulator.state.items()}
-    slots = np.flatnonzero((simulator.world_of_slot.numpy() == world) & (state["status"] != _STATUS_ABSENT))
+    slots = np.flatnonzero((simulator.world_of_slot.numpy() == world) & ~np.isin(state["status"], _STATUSES_WITHOUT_BODY))
     heading = state["heading_rad"][slots]
     size = np.stack([state[f"{name}_m"][slots] for name in ("length", "width", "height")], axis=1)
     # Positions in the state are those of rear axles; boxes of the scene have the centres of bodies.
