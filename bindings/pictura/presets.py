@@ -40,7 +40,8 @@ def preset_options(preset: str, maps: Any = None, num_agents: int | None = None,
     Args:
         preset: "demo", "town" or "paper".
         maps: Maps instead of the preset's maps.
-        num_agents: Number of agents in each world; None: the preset draws a number for each world.
+        num_agents: Number of agents in each world; None: the preset draws a number for each world,
+            or, with num_worlds, its maximum.
         given: Other arguments, which override the preset. `conditioning` overrides only the values that it names, and
             num_envs the number of slots.
 
@@ -65,7 +66,7 @@ def preset_options(preset: str, maps: Any = None, num_agents: int | None = None,
         options["observation"] = "images"
         if given.get("observation", "images") in ("images", "both"):
             options["rig"] = pictura.Rig.paper(render["width_px"], render["height_px"])
-    if num_agents is None and "num_worlds" not in given:
+    if num_agents is None and not {"num_worlds", "worlds"} & given.keys():
         maps = [maps] if isinstance(maps, (str, pictura.Map)) else list(maps)
         num_slots = given.pop("num_envs", None) or simulator["num_slots"]
         ends = simulator["min_agents"], simulator["max_agents"]
