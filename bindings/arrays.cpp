@@ -355,7 +355,6 @@ BorrowedArray borrow(const py::handle& object, std::string_view what, Stream str
     const auto& lent = py::cast<const LentArray&>(object);
     borrowed.array_ = lent.array;
     borrowed.keep_ = py::reinterpret_borrow<py::object>(object);
-    order_before(lent, lent.array.device.is_host() ? py::object(py::none()) : py::object(py::int_(-1)));
 #ifdef PICTURA_HAS_CUDA
     if (!lent.array.device.is_host()) order_streams(lent.array.device, lent.stream, stream);
 #endif

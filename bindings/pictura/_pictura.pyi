@@ -703,8 +703,8 @@ class Renderer:
         
         views: VIEW_DTYPE [n], or Simulator.views.
         out: Images, or an array [n, cameras, 3, height, width] in the renderer's memory (NumPy, torch, ...) if all cameras have
-        the same image size. Its type is uint8, float32, float16 or bfloat16, with values from 0 to 255. Default: new Images
-        with `dtype` and `planes`.
+        the same image size. Its type is uint8 or bfloat16, with values from 0 to 255, or float32 or float16, with values from 0
+        to 1. Default: new Images with `dtype` and `planes`.
         On CUDA the call returns when the work is enqueued. On the CPU, ^C ends the call between two views. Raises
         pictura.Error, which names an invalid array.
         """

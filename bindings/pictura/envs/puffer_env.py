@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+import pictura
 from pictura.envs.batch import Batch
 from pictura.envs.gymnasium_spaces import action_space, observation_space
 
@@ -63,6 +64,8 @@ class DrivePufferEnv(_Base):
         self.batch = Batch(maps, num_agents, num_worlds, seed=seed, device="cpu", array="numpy", **options)
         space = observation_space(self.batch)
         self._key = None if self.batch.observation == "flat" else "rgb"
+        if self._key and self._key not in space.spaces:
+            raise pictura.UsageError("rig: PufferLib expects cameras of one image size")
         self.single_observation_space = space if self._key is None else space[self._key]
         self.single_action_space = action_space(self.batch)
         self.num_agents = self.batch.num_slots
@@ -109,8 +112,7 @@ class DrivePufferEnv(_Base):
         self.masks[:] = self.batch.active
 
     def _log(self) -> dict[str, float]:
-        """Returns a list with a dict of means over the agents' episodes that ended since the last log, or an empty
-        list."""
+        """Returns means over the agents' episodes that ended since the last log, and their number `n`."""
         now, before = self.batch.simulator.totals(), self._before
         finished = now["finished_agent_episodes"] - before["finished_agent_episodes"]
         self._before = now
