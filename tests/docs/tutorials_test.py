@@ -37,7 +37,7 @@ def shorter(line):
         if word == "--backend":
             words[i + 1] = "cpu"
     # The format fixes the length of rollouts.
-    if words[0] in ("evaluate", "replay") and not {"--steps", "--rollouts"} & set(words):
+    if words[0] in ("evaluate", "replay") and not {"--steps", "--rollouts", "--merge"} & set(words):
         words += ["--steps", str(AT_MOST["--steps"])]
     if words[0] == "train":
         words += ["--set", "train.updates=1", "--set", "simulator.num_slots=8"]
