@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "pictura/map/endless_lanes.h"
 
@@ -97,11 +98,14 @@ class RemainingRouteLengths {
   std::vector<float> way_after_m_;  // [lanes] for the leftmost lane of each group
 };
 
+// An edge crosses an opening if it passes within kOff_m of its middle. It is cut kBeyond_m beyond the opening's sides.
+constexpr float kOff_m = 0.1f, kBeyond_m = 0.05f;
+
 /// Appends the parts of an edge that are beside an opening and at least kMinEdge_m long. The edge across an opening
 /// passes through its middle. It is not always perpendicular to the lane, because centre lines are oblique where lanes
 /// widen.
 void append_edge_parts_beside(const RoadEdge& edge, const LaneOpening& opening, std::vector<RoadEdge>* parts_out) {
-  constexpr float kOff_m = 0.1f, kBeyond_m = 0.05f, kMinEdge_m = 0.01f, kMaxAlong = 0.7f;
+  constexpr float kMinEdge_m = 0.01f, kMaxAlong = 0.7f;
   const Vec2 a = edge.a_m.xy() - opening.middle_m.xy(), edge_m = (edge.b_m - edge.a_m).xy();
   const float length_m = length(edge_m);
   const Vec2 way = edge_m * (1 / length_m);
@@ -118,6 +122,36 @@ void append_edge_parts_beside(const RoadEdge& edge, const LaneOpening& opening, 
   if (begin_m > kMinEdge_m) parts_out->push_back({edge.a_m, point_at(begin_m)});
   if (length_m - end_m > kMinEdge_m) parts_out->push_back({point_at(end_m), edge.b_m});
 }
+
+/// Exits and then entries, with the order of their x.
+class Openings {
+ public:
+  explicit Openings(const OpenLanes& open) : all_(open.exits) {
+    all_.insert(all_.end(), open.entries.begin(), open.entries.end());
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+      by_x_.emplace_back(all_[i].middle_m.x, i);
+      reach_m_ = std::max(reach_m_, all_[i].half_width_m + kBeyond_m + kOff_m);
+    }
+    std::sort(by_x_.begin(), by_x_.end());
+  }
+
+  /// Returns the openings that may be on an edge, in their order.
+  std::vector<const LaneOpening*> near(const RoadEdge& edge) const {
+    const auto [low, high] = std::minmax(edge.a_m.x, edge.b_m.x);
+    std::vector<std::size_t> found;
+    auto at = std::lower_bound(by_x_.begin(), by_x_.end(), std::pair{low - reach_m_, std::size_t{0}});
+    for (; at != by_x_.end() && at->first <= high + reach_m_; ++at) found.push_back(at->second);
+    std::sort(found.begin(), found.end());
+    std::vector<const LaneOpening*> openings;
+    for (const std::size_t i : found) openings.push_back(&all_[i]);
+    return openings;
+  }
+
+ private:
+  std::vector<LaneOpening> all_;
+  std::vector<std::pair<float, std::size_t>> by_x_;
+  float reach_m_ = 0;
+};
 
 }  // namespace
 
@@ -166,16 +200,15 @@ bool is_open(const RoadMap& map, const OpenLanes& open, std::size_t lane) {
 
 void remove_edges_across_openings(const OpenLanes& open, RoadMap* map_inout) {
   RoadMap& map = *map_inout;
+  const Openings openings(open);
   std::vector<RoadEdge> kept, parts, next;
   std::vector<SourceElement> sources;
   for (std::size_t i = 0; i < map.road_edges.size(); ++i) {
     parts = {map.road_edges[i]};
-    for (const std::vector<LaneOpening>* openings : {&open.exits, &open.entries}) {
-      for (const LaneOpening& opening : *openings) {
-        next.clear();
-        for (const RoadEdge& part : parts) append_edge_parts_beside(part, opening, &next);
-        parts.swap(next);
-      }
+    for (const LaneOpening* opening : openings.near(map.road_edges[i])) {
+      next.clear();
+      for (const RoadEdge& part : parts) append_edge_parts_beside(part, *opening, &next);
+      parts.swap(next);
     }
     kept.insert(kept.end(), parts.begin(), parts.end());
     sources.insert(sources.end(), parts.size(), map.provenance.road_edges[i]);
