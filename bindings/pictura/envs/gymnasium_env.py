@@ -59,8 +59,7 @@ class DriveEnv(gymnasium.Env):
         self.batch = Batch(maps, num_agents, 1, num_threads=num_threads, device="cpu", array="numpy", **options)
         self.observation_space = observation_space(self.batch)
         self.action_space = action_space(self.batch)
-        if "seed" in options:
-            self._np_random, self._np_random_seed = gymnasium.utils.seeding.np_random(options["seed"])
+        super().reset(seed=options.get("seed"))  # seeds np_random
         self._others = OtherDrivers(others, self.batch, options.get("seed", 0))
         self._slot = 0
 

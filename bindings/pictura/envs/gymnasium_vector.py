@@ -74,8 +74,7 @@ class DriveVectorEnv(gymnasium.vector.VectorEnv):
         self.render_mode = render_mode
         self._same_step, self._copy = autoreset == "same_step", copy
         self.batch = Batch(maps, num_agents, num_worlds, **options)
-        if "seed" in options:
-            self._np_random, self._np_random_seed = gymnasium.utils.seeding.np_random(options["seed"])
+        super().reset(seed=options.get("seed"))  # seeds np_random
         self.num_envs = self.batch.num_slots
         self.single_observation_space = observation_space(self.batch)
         self.single_action_space = action_space(self.batch)
