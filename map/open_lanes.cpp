@@ -123,7 +123,7 @@ void append_edge_parts_beside(const RoadEdge& edge, const LaneOpening& opening, 
   if (length_m - end_m > kMinEdge_m) parts_out->push_back({point_at(end_m), edge.b_m});
 }
 
-/// Exits and then entries, with the order of their x.
+/// Openings, exits before entries, that are found by x.
 class Openings {
  public:
   explicit Openings(const OpenLanes& open) : all_(open.exits) {

@@ -244,8 +244,8 @@ std::vector<SectionElement> section_elements(const Element& lanes, double road_l
   return sections;
 }
 
-/// Reads the sections, and counts as continue_lanes() does. A singleSide section defines the lanes of one side; the
-/// lanes of the other side continue.
+/// Reads the sections. A singleSide section defines the lanes of one side; the lanes of the other side continue.
+/// copied_inout: see continue_lanes().
 std::vector<FileSection> read_sections(const Element& lanes, double road_length, std::size_t* copied_inout) {
   const std::vector<SectionElement> elements = section_elements(lanes, road_length);
   std::vector<FileSection> sections;
