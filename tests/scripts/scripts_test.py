@@ -255,14 +255,21 @@ class Lanes(OnADevice):
                 status, said, _ = self.work(f"0 run{len(arguments)} 1 pictura train late{arguments}")
                 self.assertEqual((status, "is not done: out of time" in said), (0, not is_done), said)
 
+    def test_the_last_line_may_lack_a_newline(self):
+        list_of_work = self.write("list", "0 first 1 true\n0 last 1 true")
+        result = self.run_script("gpu_lanes", "--out", self.root / "out", "100", list_of_work)
+        self.assertIn("GPU 0: last is done", result.stdout)
+
     def test_a_run_is_packed_with_its_checkpoint(self):
         self.write("runs/kept/checkpoint.ckpt", "state")
         self.write("runs/kept/untrained.ckpt", "first weights")
+        stale = self.write("out/kept.tar.gz.001", "part of a larger pack")
         list_of_work = self.write("list", "0 good 1 true\n")
         result = self.run_script("gpu_lanes", "--out", self.root / "out", "--pack", "kept", "100", list_of_work)
         self.assertEqual(result.returncode, 0, result.stderr)
-        with tarfile.open(self.root / "out/kept.tar.gz.00") as tar:
+        with tarfile.open(self.root / "out/kept.tar.gz.000") as tar:
             self.assertEqual([member.name for member in tar if member.isfile()], ["kept/checkpoint.ckpt"])
+        self.assertFalse(stale.exists())
         result = self.run_script("gpu_lanes", "--out", self.root / "out", "--pack", "lost", "100", list_of_work)
         self.assertEqual(result.returncode, 1)
         self.assertIn("runs/lost is not packed: it has no checkpoint", result.stdout)
@@ -749,6 +756,9 @@ class Runs(unittest.TestCase):
         self.assertEqual(self.asked(*train, "--resume").count("--resume"), 1)
         self.assertNotIn("--resume", self.asked(*train, "--overwrite"))
         self.assertNotIn("--resume", self.asked("gpu_train", "other"))
+        for ranks in ("0", "x"):
+            result = subprocess.run([self.root / "scripts/gpu_train", "--ranks", ranks, "run"], capture_output=True, text=True, timeout=60)
+            self.assertEqual((result.returncode, f"--ranks: expected a number of at least 1, got '{ranks}'" in result.stderr), (2, True), result.stderr)
 
 
 class Profile(unittest.TestCase):
