@@ -9,6 +9,7 @@
 #include "pictura/common/pixel_samples.h"
 #include "pictura/common/support/messages.h"
 #include "pictura/common/support/suggestion.h"
+#include "pictura/configuration/run_section.h"
 
 namespace pictura {
 
@@ -16,6 +17,13 @@ CLI::Validator one_of(const std::vector<std::string>& names) {
   auto complaint = [names](const std::string& text) -> std::string {
     if (std::find(names.begin(), names.end(), text) != names.end()) return "";
     return fmt::format("expected one of {}; got '{}'{}", fmt::join(names, ", "), text, suggestion(text, names));
+  };
+  return {complaint, ""};
+}
+
+CLI::Validator device_name() {
+  auto complaint = [](const std::string& text) -> std::string {
+    return is_device(text) ? "" : fmt::format("expected one of {}; got '{}'", kDevices, text);
   };
   return {complaint, ""};
 }
@@ -49,8 +57,10 @@ void add_backend_options(CLI::App* command, const std::string& otherwise, Sessio
 }
 
 void add_policy_backend_options(CLI::App* command, const std::string& otherwise, SessionOptions* options_out) {
-  command->add_option("--device", options_out->device,
-                      fmt::format("Device of the policy: cpu, cuda, cuda:N or auto; default: {}", otherwise));
+  command
+      ->add_option("--device", options_out->device,
+                   fmt::format("Device of the policy: cpu, cuda, cuda:N or auto; default: {}", otherwise))
+      ->check(device_name());
   add_backend_options(command, otherwise, options_out);
 }
 

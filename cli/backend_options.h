@@ -14,6 +14,8 @@ namespace pictura {
 
 /// The error lists the names.
 CLI::Validator one_of(const std::vector<std::string>& names);
+/// Accepts the names of devices (kDevices).
+CLI::Validator device_name();
 /// Returns a function that replaces the old name of a flag's choice, with a warning.
 std::function<std::string(std::string)> renaming(const std::string& flag, const RenamedChoice& renamed);
 

@@ -70,6 +70,14 @@ std::optional<NamedShare> parse_share(const std::string& text) {
   return NamedShare{text.substr(0, sign), *share};
 }
 
+bool is_device(std::string_view text) {
+  if (text == "cpu" || text == "cuda" || text == "auto") return true;
+  constexpr std::string_view kPrefix = "cuda:";
+  constexpr size_t kMaxDigits = 3;
+  return text.starts_with(kPrefix) && text.size() > kPrefix.size() && text.size() <= kPrefix.size() + kMaxDigits &&
+         text.find_first_not_of("0123456789", kPrefix.size()) == std::string_view::npos;
+}
+
 std::string to_toml(const Config& config) {
   ConfigWriter writer;
   visit(config, writer);

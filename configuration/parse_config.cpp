@@ -247,14 +247,6 @@ class Reader {
     return *number;
   }
 
-  static bool is_device(const std::string& text) {
-    if (text == "cpu" || text == "cuda" || text == "auto") return true;
-    constexpr std::string_view kPrefix = "cuda:";
-    constexpr size_t kMaxDigits = 3;
-    return text.starts_with(kPrefix) && text.size() > kPrefix.size() && text.size() <= kPrefix.size() + kMaxDigits &&
-           text.find_first_not_of("0123456789", kPrefix.size()) == std::string::npos;
-  }
-
   std::string text_of(const std::string& key, const toml::node& node) const {
     if (!node.is_string()) throw_error(key, node, "expected a string");
     return node.as_string()->get();

@@ -24,7 +24,6 @@ inline constexpr std::array kOptimizers{"adamw", "muon"};
 inline constexpr std::array kFilterThresholds{"maximum", "quantile"};
 inline constexpr std::array kHaltedSlots{"skip", "draw"};
 
-inline constexpr const char* kDevices = "cpu, cuda, cuda:N, auto";
 inline constexpr const char* kSizeChangesExpected =
     "a list of [agent_steps, width_px, height_px] or [agent_steps, width_px, height_px, patch_px, line_floor_px]";
 

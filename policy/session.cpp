@@ -12,6 +12,7 @@ namespace pictura {
 Config with_session_options(const Config& trained, const SessionOptions& options) {
   Config config = with_evaluate_conditioning(trained, options.conditioning);
   config.run.num_threads = options.num_threads;
+  if (!is_device(options.device)) fail_usage("device: expected one of {}; got '{}'", kDevices, options.device);
   config.run.device = options.device;
   config.simulator.backend = options.simulator;
   config.simulator.walls |= options.adds_walls;

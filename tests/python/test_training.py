@@ -280,6 +280,9 @@ def test_a_policy_decides_at_the_requested_interval(trained):
     assert returns[0] == returns[1] != returns[2], "it was trained to decide at every step"
     with pytest.raises(pictura.UsageError, match="decision_steps: expected 0 to 1000, got -1"):
         pictura.PolicySession(checkpoint, device="cpu", decision_steps=-1)
+    for device in ("cpu:0", "cuda:x", "cuda:-1"):
+        with pytest.raises(pictura.UsageError, match=f"device: expected one of cpu, cuda, cuda:N, auto; got '{device}'"):
+            pictura.PolicySession(checkpoint, device=device)
     with pytest.raises(pictura.UsageError, match="decision_steps: expected a trained policy, got the controller lane"):
         pictura.evaluate("", ["procedural:1"], controller="lane", decision_steps=3)
 
