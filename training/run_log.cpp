@@ -172,21 +172,29 @@ RunLog::RunLog(const std::string& folder, const Config& config, int64_t updates_
       first_update_(updates_done),
       first_agent_steps_(agent_steps),
       on_notice_(on_notice),
+      folder_(folder),
       recent_(recent.begin(), recent.end()),
       minute_{{0, agent_steps}} {
   if (folder.empty()) return;
-  events_.emplace(folder);
-  ConfigWriter writer;
-  visit(config, writer);
-  Settings settings;
-  for (const auto& [key, value] : writer.lines) settings.emplace_back(key.name, value);
-  events_->write_configuration(settings, writer.toml);
   csv_.emplace(folder + "/progress.csv", scalars_of(config, {}, {}), updates_done, on_notice);
   if (config_.train.evaluate_every > 0) {
     EvaluationRecord columns;
     if (config_.train.weight_average > 0) columns.average_row.emplace();
     evaluation_csv_.emplace(folder + "/evaluation.csv", scalars_of_evaluation(0, columns), updates_done, on_notice);
   }
+}
+
+void RunLog::write_event(int64_t agent_steps, const Scalars& scalars) {
+  if (folder_.empty()) return;
+  if (!events_) {
+    events_.emplace(folder_);
+    ConfigWriter writer;
+    visit(config_, writer);
+    Settings settings;
+    for (const auto& [key, value] : writer.lines) settings.emplace_back(key.name, value);
+    events_->write_configuration(settings, writer.toml);
+  }
+  events_->write(agent_steps, scalars);
 }
 
 TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecord& record) {
@@ -235,7 +243,7 @@ TrainProgress RunLog::add(int64_t update, int64_t agent_steps, const UpdateRecor
 
   progress.scalars = scalars_of(config_, progress, record);
   if (csv_) csv_->write(update, progress.scalars);
-  if (events_) events_->write(agent_steps, progress.scalars);
+  write_event(agent_steps, progress.scalars);
   return progress;
 }
 
@@ -243,7 +251,7 @@ void RunLog::add_evaluation(int64_t update, int64_t agent_steps, const Evaluatio
   const Scalars scalars = scalars_of_evaluation(agent_steps, record);
   if (evaluation_csv_) {
     evaluation_csv_->write(update, scalars);
-    events_->write(agent_steps, scalars);
+    write_event(agent_steps, scalars);
   }
   evaluation_s_ += record.seconds;
 }

@@ -74,11 +74,14 @@ class RunLog {
   double episode_return() const;
 
  private:
+  void write_event(int64_t agent_steps, const Scalars& scalars);
+
   const Config config_;
   const int64_t first_update_, first_agent_steps_;
   const std::function<void(const std::string&)> on_notice_;
   bool has_reported_rejected_ = false;
-  std::optional<EventFile> events_;
+  const std::string folder_;         // empty: no files
+  std::optional<EventFile> events_;  // opened by the first event, so that resuming a finished run adds no file
   std::optional<ProgressCsv> csv_;
   std::optional<ProgressCsv> evaluation_csv_;  // null if the run never evaluates
   double evaluation_s_ = 0;

@@ -58,6 +58,10 @@ class Training(CommandCase):
             self.assertEqual(whole[key], parts[key], key)
         for name in ("checkpoint.ckpt", "untrained.ckpt", "policy.safetensors", "progress.csv"):
             self.assertTrue((self.folder / "whole" / name).exists(), name)
+        # A finished run has no further updates, so resuming it adds no file.
+        files = sorted((self.folder / "whole").iterdir())
+        self.json_of("train", *TINY, "--set", "train.updates=4", "--out", self.folder / "whole", "--resume")
+        self.assertEqual(sorted((self.folder / "whole").iterdir()), files)
 
     def test_an_existing_run_requires_resume_or_overwrite(self):
         one = ["train", *TINY, "--set", "train.updates=1", "--out", self.folder / "run"]
@@ -100,7 +104,7 @@ class Training(CommandCase):
         out = ["--out", self.folder / "run"]
         self.assert_refused(2, "expected one of cpu, ", *one, *out, "--renderer", "vulkan")
         self.assert_refused(2, "expected one of cpu, ", *one, *out, "--simulator", "null")
-        self.assert_refused(1, "run.device: expected one of cpu, cuda, cuda:N, auto", *one, *out, "--device", "gpu")
+        self.assert_refused(2, "--device: expected one of cpu, cuda, cuda:N, auto; got 'gpu'", *one, *out, "--device", "gpu")
         on_host = 'render.backend: "null" uses host memory, but run.device is "cuda"'
         self.assert_refused(1, on_host, *one, *out, "--renderer", "null", "--device", "cuda")
         if not pathlib.Path("/dev/nvidia0").exists():
