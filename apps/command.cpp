@@ -114,7 +114,7 @@ int run_command(int argc, char** argv) {
   add_completion_command(app);
   add_bench_command(app);
   reject_empty_values(&app);
-  app.parse_complete_callback([&app] { reject_shared_files(app); });
+  app.parse_complete_callback([&app] { check_files(&app); });
 
   return end_output(run(app, argc, argv));
 }

@@ -17,7 +17,6 @@
 #include "pictura/cli/report.h"
 #include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
-#include "pictura/common/support/file.h"
 #include "pictura/common/support/numbers.h"
 #include "pictura/driving/replay_scenarios.h"
 #include "pictura/evaluation/estimate_json.h"
@@ -320,8 +319,9 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
     fail_usage("--others: cannot be combined with --replay, --gallery or --infractions");
   }
   check_severities(command, *arguments);
+  std::optional<OutputFolder> gallery;
   if (!arguments->gallery.empty()) {
-    make_output_folder(arguments->gallery);
+    gallery.emplace(arguments->gallery);
     check_gallery(arguments->gallery);
   }
   InfractionObserver infractions;
@@ -330,14 +330,24 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
       merges ? Reports{merged(arguments->parts)} : evaluate_severities(arguments->severities, &evaluation);
   evaluation.observer = nullptr;
   const std::vector<InfractionGroup> groups = group_infractions(infractions.found());
-  if (lists_infractions) write_infractions_csv(arguments->infractions, infractions.found());
-  if (!arguments->out.empty()) write_results(arguments->out, reports.front().results);
   if (arguments->json)
     print_report(evaluation, reports, lists_infractions ? groups_json(groups) : Json(nullptr));
   else
     print_table(reports);
   if (lists_infractions && !arguments->json) print_groups(groups);
-  if (!reports.back().interrupted) return replay_worst(*arguments, reports.front().results);
+  const bool interrupted = reports.back().interrupted;
+  const EvaluationResults& results = reports.front().results;
+  const auto write_infractions = [&] {
+    if (lists_infractions) write_infractions_csv(arguments->infractions, infractions.found());
+  };
+  const auto write_counts = [&] {
+    if (!arguments->out.empty()) write_results(arguments->out, results);
+  };
+  const auto write_replays = [&] {
+    if (!interrupted) replay_worst(*arguments, results);
+  };
+  call_all({write_infractions, write_counts, write_replays});
+  if (!interrupted) return;
   int finished = 0;
   for (const auto& [label, row] : labelled(reports)) finished += row.driver.empty() ? row.scenarios : 0;
   const size_t num_densities = evaluation.agents_per_world > 0 ? 1 : evaluation.densities.size();
@@ -376,7 +386,8 @@ void add_evaluate_command(CLI::App& app) {
   EvaluateOptions& options = arguments->evaluation;
   CLI::App* command = app.add_subcommand("evaluate", "Measure a policy's driving (the paper's protocols)");
   CLI::Option* const checkpoint =
-      command->add_option("CHECKPOINT", options.checkpoint, "Checkpoint written by train, or safetensors");
+      command->add_option("CHECKPOINT", options.checkpoint, "Checkpoint written by train, or safetensors")
+          ->check(input_file());
   CLI::Option* const policy =
       command
           ->add_option(
@@ -390,6 +401,7 @@ void add_evaluate_command(CLI::App& app) {
       ->add_option("--merge", arguments->parts,
                    "Instead of evaluating: merge the parts of one evaluation, which --out wrote; the result is exactly "
                    "that of the whole evaluation")
+      ->check(input_file())
       ->excludes(checkpoint)
       ->excludes(policy);
   add_evaluation_options(command, &arguments->evaluation)->excludes(policy);
@@ -409,6 +421,7 @@ void add_evaluate_command(CLI::App& app) {
                                "the policy drives while impaired: {}. The report has metrics of each driver",
                                fmt::join(town_controller_names(), ", "), fmt::join(impairment_names(), ", ")))
       ->delimiter(',')
+      ->check(input_file())
       ->allow_extra_args(false);
   command
       ->add_option(
@@ -421,7 +434,7 @@ void add_evaluate_command(CLI::App& app) {
   CLI::Option* const rig =
       command->add_option("--rig", options.rig,
                           "Rig file, whose cameras replace the cameras of the training; their number must be the same");
-  rig->excludes(policy);
+  rig->check(input_file())->excludes(policy);
   command
       ->add_option("--size", arguments->size, "Image size of the paper's rig in pixels, WxH; default: as in training")
       ->excludes(rig)
@@ -436,18 +449,21 @@ void add_evaluate_command(CLI::App& app) {
       ->transform(number(0, kMaxCameraSeverity))
       ->allow_extra_args(false)
       ->excludes(policy);
-  command->add_option("--backbone", options.backbone,
-                      "Path of the program of policy.backbone, if it has moved since training");
-  command->add_option("--out", arguments->out, "File for the counts of each scenario or scene, for --merge");
+  command
+      ->add_option("--backbone", options.backbone,
+                   "Path of the program of policy.backbone, if it has moved since training")
+      ->check(input_file());
+  command->add_option("--out", arguments->out, "File for the counts of each scenario or scene, for --merge")
+      ->check(output_file());
   command
       ->add_option(
           "--infractions", arguments->infractions,
           "File with the place, partner and speed of every infraction; also prints a table of the most frequent kinds")
-      ->check(file_ending(".csv"));
+      ->check(output_file({".csv"}));
   command
       ->add_option("--replay", arguments->replay,
                    "Simulate the worst scenario again, and record it as a page for browsers")
-      ->check(file_ending(".html"));
+      ->check(output_file({".html"}));
   CLI::Option* const replays =
       add_number_option(command, "--replays", arguments->replays,
                         "Simulate the N worst scenarios again, and record them in --gallery", 1);

@@ -3,8 +3,10 @@
 #include "pictura/cli/backend_options.h"
 #include "pictura/cli/evaluation_options.h"
 #include "pictura/cli/file_options.h"
+#include "pictura/cli/number_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/commit.h"
+#include "pictura/configuration/policy_section.h"
 #include "pictura/policy/export_policy.h"
 
 namespace pictura {
@@ -17,8 +19,10 @@ void add_export_command(CLI::App& app) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("export", "Write the weights of a policy as safetensors");
-  command->add_option("POLICY", arguments->policy, "Checkpoint written by train, or safetensors")->required();
-  command->add_option("--out", arguments->out, "File to write")->check(file_ending(".safetensors"))->required();
+  command->add_option("POLICY", arguments->policy, "Checkpoint written by train, or safetensors")
+      ->check(input_file())
+      ->required();
+  command->add_option("--out", arguments->out, "File to write")->check(output_file({".safetensors"}))->required();
   command
       ->add_option("--weights", arguments->weights,
                    "bf16: rounded to 8 significant bits, half the size; f32: unchanged")
@@ -34,7 +38,7 @@ void add_export_command(CLI::App& app) {
                    "unchanged; outputs are equal, up to the rounding of --weights, until the policy learns; default: "
                    "unchanged")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber)
+      ->transform(whole_number(1, PolicySection::kMaxConvChannels))
       ->allow_extra_args(false);
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(

@@ -215,8 +215,9 @@ void add_map_command(CLI::App& app) {
   command
       ->add_option("--png", arguments->png,
                    "Draw lanes, markings, edges, lights, signs, crosswalks, parking and building lines into this file")
-      ->check(file_ending(".png"));
-  command->add_option("--svg", arguments->svg, "Draw the same picture as vector graphics")->check(file_ending(".svg"));
+      ->check(output_file({".png"}));
+  command->add_option("--svg", arguments->svg, "Draw the same picture as vector graphics")
+      ->check(output_file({".svg"}));
   add_number_option(command, "--size", arguments->size_px, "Longer side of the picture in pixels", 64, 16384);
   CLI::Option* box =
       command
@@ -237,7 +238,7 @@ void add_map_command(CLI::App& app) {
   command
       ->add_option("--xodr", arguments->xodr,
                    "Write the map as OpenDRIVE, with only those elements that the importer uses")
-      ->check(file_ending(".xodr"));
+      ->check(output_file({".xodr"}));
   command->add_flag("--strict", arguments->strict,
                     "Reject every fault of the file, including faults that are repaired by default");
   command->add_flag("--lenient")->group("");  // option of earlier versions; it is rejected with a hint

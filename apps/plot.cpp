@@ -28,6 +28,7 @@ void add_plot_command(CLI::App& app) {
               "Instead of runs: a file of evaluations during training, which scripts/reproduce_table --curves wrote; "
               "draws five metrics of the protocol, with a line for medium density and a band over all densities")
           ->check(CLI::ExistingFile)
+          ->check(input_file())
           ->excludes("RUN");
   CLI::Option* const severities =
       command
@@ -35,10 +36,11 @@ void add_plot_command(CLI::App& app) {
                        "Instead of runs: outputs of evaluate --camera-severity --json; draws metrics of the protocol "
                        "by severity, with a line and its 95 % interval for each file and density")
           ->check(CLI::ExistingFile)
+          ->check(input_file())
           ->excludes("RUN")
           ->excludes(evaluations);
   command->add_option("--out", arguments->out, "Picture to write: a PNG, or vector graphics as .svg")
-      ->check(file_ending(".png", ".svg"))
+      ->check(output_file({".png", ".svg"}))
       ->capture_default_str();
   command
       ->add_option(
@@ -67,9 +69,10 @@ void add_plot_command(CLI::App& app) {
   command->footer(
       "docs/reference/run_folder.md lists the columns. With many updates, points are means of consecutive updates.\n"
       "The mean of several runs ends where the shortest run ends.\n"
-      "Charts need Python 3.11 with Matplotlib; PICTURA_PYTHON is the path of the interpreter. Without Matplotlib, "
-      "the\n"
-      "data is written to OUT.json, and the status is 1.\n"
+      "--json prints the picture's path, the meaning of the band, and for each line its name, number of points and\n"
+      "range of x; for runs also the metrics and their last values.\n"
+      "Charts need Python 3.11 with Matplotlib; PICTURA_PYTHON is the path of the interpreter. If Python runs but\n"
+      "lacks Matplotlib, it writes the data to OUT.json, and the status is 1.\n"
       "Examples:\n"
       "  pictura plot runs/a runs/b --out curves.png\n"
       "  pictura plot runs/town01_seed* --x hours --metrics episode_return,off_road_per_km\n"

@@ -12,6 +12,7 @@
 #include "pictura/cli/case_replay_options.h"
 #include "pictura/cli/draw_chart.h"
 #include "pictura/cli/evaluation_options.h"
+#include "pictura/cli/file_options.h"
 #include "pictura/cli/option_flags.h"
 #include "pictura/cli/report.h"
 #include "pictura/common/error.h"
@@ -67,6 +68,7 @@ void add_options(CLI::App* command, ProbeArguments<Probe>* arguments, const std:
   command
       ->add_option("POLICY", probe.policies,
                    "Checkpoints written by train, or safetensors; the world is that of the first policy's training")
+      ->check(input_file())
       ->required();
   add_evaluation_options(command, &probe.worlds);
   visit_options(probe, FlagAdder(command));
@@ -80,7 +82,7 @@ void add_options(CLI::App* command, ProbeArguments<Probe>* arguments, const std:
 // Creates the folder for a probe's files, and runs the probe with a progress line.
 template <typename Results, typename Probe>
 Results run_probe(Results (*ask)(const Probe&), ProbeArguments<Probe>* arguments) {
-  make_output_folder(arguments->out);
+  const OutputFolder folder(arguments->out);
   ProgressLine line;
   arguments->probe.worlds.on_progress = [&line](double done, double eta_s) {
     line.update(fmt::format("probing: {:.0f} %  ETA {}", 100 * done, format_duration(eta_s)));

@@ -13,7 +13,6 @@
 #include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
 #include "pictura/common/scene_file.h"
-#include "pictura/common/support/file.h"
 #include "pictura/common/support/filled_folder.h"
 #include "pictura/common/support/hash.h"
 #include "pictura/common/support/interrupt.h"
@@ -63,7 +62,6 @@ std::unique_ptr<Renderer> open_renderer(const RenderArguments& arguments, Render
   PICTURA_CHECK(renderer->device().is_host(), "--renderer {}: pictures are written from host memory; use cpu",
                 renderer->name());
   if (name == "auto") print_message("backend {}\n", choice);
-  make_output_folder(arguments.out);
   return renderer;
 }
 
@@ -264,6 +262,7 @@ void add_render_command(CLI::App& app) {
       "  pictura render tests/golden/crossing.toml --backend cpu --planes depth,class --out images\n"
       "  pictura render validation.tfrecord-00000-of-00150#7 --start 10 --tracks self,1014 --out images");
   command->callback([arguments, size, command] {
+    const OutputFolder folder(arguments->out);
     if (is_scene_file(arguments->world.map)) {
       reject_world_options(*command);
       return render_scene_file(*arguments);

@@ -61,28 +61,28 @@ void run_replay(const ReplayArguments& arguments) {
   if (arguments.gallery.empty()) {
     const Replay replay = record(arguments, arguments.world.seed, &line);
     line.finish();
-    if (!arguments.out.empty()) write_replay_with_message(arguments.out, replay);
-    if (!arguments.mcap.empty()) write_mcap_with_message(arguments.mcap, replay);
     if (arguments.json) print_json(facts_of(arguments.out.empty() ? arguments.mcap : arguments.out, replay));
-    return;
+    return write_replay_files(replay, arguments.out, arguments.mcap);
   }
-  FilledFolder pages(arguments.gallery, "gallery");
+  const OutputFolder folder(arguments.gallery);
   check_gallery(arguments.gallery);
+  std::optional<FilledFolder> pages;  // with the first page
   Json replays = Json::array();
   try {
     for (int episode = 0; episode < arguments.episodes; ++episode) {
       const uint64_t seed = arguments.world.seed + static_cast<uint64_t>(episode);
       const Replay replay = record(arguments, seed, &line);
       line.finish();
-      const std::string path = pages.file(fmt::format("seed_{}.html", seed));
+      if (!pages) pages.emplace(arguments.gallery, "gallery");
+      const std::string path = pages->file(fmt::format("seed_{}.html", seed));
       write_replay_with_message(path, replay);
       replays.push_back(facts_of(path, replay));
     }
   } catch (const Interrupted&) {
-    if (!replays.empty()) write_index(&pages);  // lists the completed replays
+    if (!replays.empty()) write_index(&*pages);  // lists the completed replays
     throw;
   }
-  write_index(&pages);
+  write_index(&*pages);
   if (arguments.json) print_json({{"gallery", arguments.gallery}, {"replays", replays}});
 }
 
@@ -93,14 +93,14 @@ void add_replay_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("replay", "Record a world as a page for browsers");
   add_driving_options(command, &arguments->world, &arguments->steps, &arguments->policy);
   add_recording_options(command, &arguments->recording);
-  CLI::Option* const out = command->add_option("--out", arguments->out, "Page to write")->check(file_ending(".html"));
+  CLI::Option* const out = command->add_option("--out", arguments->out, "Page to write")->check(output_file({".html"}));
   CLI::Option* const gallery =
       command->add_option("--gallery", arguments->gallery,
                           "Instead of one page: folder for a page of each seed, and an index that lists the worst "
                           "replay first; replaces the pages of an earlier gallery");
   gallery->excludes(out);
   command->add_option("--mcap", arguments->mcap, "Also write an MCAP file, for Foxglove; with or without a page")
-      ->check(file_ending(".mcap"))
+      ->check(output_file({".mcap"}))
       ->excludes(gallery);
   add_number_option(command, "--episodes", arguments->episodes, "Number of seeds, from --seed on, for --gallery", 1,
                     10000);

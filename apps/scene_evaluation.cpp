@@ -145,6 +145,7 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments) {
   command
       ->add_option("--scenes", arguments->scenes,
                    "Scenes of the protocol: files, folders of files, FILE#K or FILE#SCENARIO_ID, separated by commas")
+      ->check(input_file())
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option(
@@ -160,10 +161,11 @@ void add_scene_options(CLI::App* command, SceneArguments* arguments) {
                                fmt::join(rules, "; ")))
       ->allow_extra_args(false);
   command->add_option("--csv", arguments->csv, "File with a row for every driven road user of every scene")
-      ->check(file_ending(".csv"));
-  command->add_option(
-      "--rollouts", arguments->rollouts,
-      "With --protocol simagents: file for the rollouts, in the format of the Waymo sim-agents challenge");
+      ->check(output_file({".csv"}));
+  command
+      ->add_option("--rollouts", arguments->rollouts,
+                   "With --protocol simagents: file for the rollouts, in the format of the Waymo sim-agents challenge")
+      ->check(output_file());
   command
       ->add_option("--realism", arguments->realism,
                    "With --protocol simagents: score how realistic the rollouts are; the value is the year of the "
@@ -221,10 +223,17 @@ void run_scene_evaluation(const CLI::App& command, const SceneArguments& argumen
   options.on_progress = [&progress](double done, double eta_s) { progress.update(done, eta_s); };
   const SceneEvaluation evaluation = evaluate_scenes(options);
   progress.finish();
-  if (csv) csv->commit();
-  if (rollouts) rollouts->commit();
-  if (!out.empty()) write_results(out, evaluation.results);
   print(options, evaluation, json);
+  const auto write_csv = [&csv] {
+    if (csv) csv->commit();
+  };
+  const auto write_rollouts = [&rollouts] {
+    if (rollouts) rollouts->commit();
+  };
+  const auto write_counts = [&] {
+    if (!out.empty()) write_results(out, evaluation.results);
+  };
+  call_all({write_csv, write_rollouts, write_counts});
   if (evaluation.interrupted) {
     throw Interrupted(fmt::format("interrupted; {} of {} scenes are completed and counted above",
                                   evaluation.results.num_scenes, evaluation.found));
@@ -238,8 +247,8 @@ void merge_scene_evaluations(const std::vector<std::string>& paths, const std::s
   evaluation.results = merge(parts, paths);
   evaluation.rows = rows_of(evaluation.results);
   evaluation.found = evaluation.results.num_scenes;
-  if (!out.empty()) write_results(out, evaluation.results);
   print(DriverOptions{}, evaluation, json);
+  if (!out.empty()) write_results(out, evaluation.results);
 }
 
 }  // namespace pictura

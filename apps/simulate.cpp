@@ -2,6 +2,7 @@
 // cameras.
 #include <algorithm>
 #include <array>
+#include <exception>
 #include <limits>
 #include <optional>
 
@@ -214,8 +215,10 @@ void run_simulate(SimulateArguments arguments) {
 
   std::unique_ptr<Recording> recording;
   const RecordedDriver driver{arguments.policy, world.session.get(), world.renderer.get()};
-  if (!arguments.replay.empty() || !arguments.mcap.empty())
+  if (!arguments.replay.empty() || !arguments.mcap.empty()) {
+    if (!arguments.endless) check_replay_room(simulator->num_slots(), arguments.steps);
     recording = std::make_unique<Recording>(*simulator, driver, arguments.recording);
+  }
   std::optional<SceneRecorder> saved;
   if (!arguments.scene.empty()) saved.emplace(*simulator);
   std::unique_ptr<LiveView> live;
@@ -226,9 +229,15 @@ void run_simulate(SimulateArguments arguments) {
   std::vector<StepObserver*> observers{live.get(), recording.get(), saved ? &*saved : nullptr, &counter, &clock};
   std::erase(observers, nullptr);
   ProgressLine line;
+  std::exception_ptr film_failure;
   const auto act = [&](int) {
     if (live && !await_step(*live)) return false;
-    if (film) film->add_frame(*simulator);
+    try {
+      if (film) film->add_frame(*simulator);
+    } catch (const Error&) {  // such as a full disk, which must not end the simulation
+      film_failure = std::current_exception();
+      film.reset();
+    }
     const Stopwatch acting;
     world.act();
     run.drive_s += acting.seconds();
@@ -245,18 +254,20 @@ void run_simulate(SimulateArguments arguments) {
   run.drive_s += run.simulate_s;
   line.finish();
   if (live) live->finish();
-  if (film && steps > 0) film->close();  // after an early interrupt, there is no frame
-  if (recording) {
-    const Replay replay = recording->finish();
-    if (!arguments.replay.empty()) write_replay_with_message(arguments.replay, replay);
-    if (!arguments.mcap.empty()) write_mcap_with_message(arguments.mcap, replay);
-  }
-  if (saved) {
+  print_simulation(run, counter, world, arguments.json);
+  const auto write_film = [&] {
+    if (film_failure) std::rethrow_exception(film_failure);
+    if (film && steps > 0) film->close();  // after an early interrupt, there is no frame
+  };
+  const auto write_scene = [&] {
+    if (!saved) return;
     write_scene_file(arguments.scene, saved->scenario());
     print_message("{}: {} steps of the first episode\n", arguments.scene, saved->num_steps() - 1);
-  }
-
-  print_simulation(run, counter, world, arguments.json);
+  };
+  const auto write_recording = [&] {
+    if (recording) write_replay_files(recording->finish(), arguments.replay, arguments.mcap);
+  };
+  call_all({write_film, write_recording, write_scene});
   if (arguments.endless) throw Interrupted(fmt::format("interrupted at step {}", steps));
   if (steps < arguments.steps) throw Interrupted(fmt::format("interrupted at step {} of {}", steps, arguments.steps));
 }
@@ -267,21 +278,24 @@ void add_simulate_command(CLI::App& app) {
   auto arguments = std::make_shared<SimulateArguments>();
   CLI::App* command = app.add_subcommand("simulate", "Drive a world and count what happens");
   add_driving_options(command, &arguments->world, &arguments->steps, &arguments->policy);
-  command->add_option("--video", arguments->video,
-                      "Film to write (.mp4 or .gif): the world from above, with goals, lights and reasons of halts, "
-                      "and one agent's camera images");
+  command
+      ->add_option("--video", arguments->video,
+                   "Film to write (.mp4 or .gif): the world from above, with goals, lights and reasons of halts, "
+                   "and one agent's camera images")
+      ->check(output_file({".mp4", ".gif"}, Ending::required));
   add_number_option(command, "--film-width", arguments->film_width_m,
                     "Width of the area that the film shows from above, in metres; 0: the whole map", 0, 1e5);
   add_number_option(command, "--film-agent", arguments->film_agent,
                     "Agent that the film follows; default: agent 0, or the self-driving car in recorded scenes", 0);
   command->add_option("--replay", arguments->replay, "Record the world as a page for browsers")
-      ->check(file_ending(".html"));
-  command->add_option("--mcap", arguments->mcap, "Also write an MCAP file, for Foxglove")->check(file_ending(".mcap"));
+      ->check(output_file({".html"}));
+  command->add_option("--mcap", arguments->mcap, "Also write an MCAP file, for Foxglove")
+      ->check(output_file({".mcap"}));
   command
       ->add_option("--scene", arguments->scene,
                    "Save the first episode as a recorded scene (*.scenario), with its lights; a replay of the scene is "
                    "bit-exact")
-      ->check(file_ending(std::string(kSceneFileEnding)));
+      ->check(output_file({std::string(kSceneFileEnding)}, Ending::required));
   add_serve_options(command, &arguments->serve);
   add_recording_options(command, &arguments->recording);
   command->add_flag("--json", arguments->json, "Print one JSON object");

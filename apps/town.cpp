@@ -31,7 +31,7 @@ void add_town_command(CLI::App& app) {
     add_number_option(command, fmt::format("--{}", feature.name), arguments->town.*feature.value, feature.help,
                       feature.low, feature.high);
   }
-  command->add_option("--out", arguments->out, ".xodr file to write")->check(file_ending(".xodr"))->required();
+  command->add_option("--out", arguments->out, ".xodr file to write")->check(output_file({".xodr"}))->required();
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "An option that is a share selects at least one element if it is above 0.\n"

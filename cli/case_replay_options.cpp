@@ -11,7 +11,7 @@ void add_case_replay_options(CLI::App* command, CaseReplayOptions* options_out, 
       command
           ->add_option("--replay", options_out->path,
                        "Page to write, which plays the scene of one case, follows its ego, and marks its road user")
-          ->check(file_ending(".html"));
+          ->check(output_file({".html"}));
   add_number_option(command, "--case", options_out->number, case_help, 0)->needs(replay);
   add_cameras_option(command, &options_out->recording)->needs(replay);
 }

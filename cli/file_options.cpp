@@ -1,13 +1,18 @@
 #include "pictura/cli/file_options.h"
 
 #include <algorithm>
-#include <array>
+#include <exception>
 #include <filesystem>
 #include <map>
+#include <set>
 
-#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "pictura/common/error.h"
+#include "pictura/common/support/file.h"
+#include "pictura/common/support/output_file.h"
 
 namespace pictura {
 
@@ -22,28 +27,22 @@ void add_map_or_scene(CLI::App* command, std::string* map_out, const std::string
               "of these (MAP#N), {}or a recorded scene: FILE.json, "
               "FILE.bin, FILE.scenario, FILE.tfrecord[#K] or FOLDER[#K], where K is a number or a scenario's id",
               more))
+      ->check(input_file())
       ->required();
-}
-
-CLI::Validator file_ending(const std::string& ending, const std::string& other) {
-  auto complaint = [ending, other](const std::string& text) -> std::string {
-    const std::string own = fs::path(text).extension().string();
-    if (own.empty() || own == ending || own == other) return "";
-    return fmt::format("expected a name that ends in {}{}{}, got '{}'", ending, other.empty() ? "" : " or ", other,
-                       text);
-  };
-  return {complaint, ""};
 }
 
 namespace {
 
-constexpr std::array kOutputs{"--out",      "--csv",   "--infractions", "--mcap",  "--png", "--replay",
-                              "--rollouts", "--scene", "--svg",         "--video", "--xodr"};
-constexpr std::array kInputs{"CHECKPOINT", "POLICY", "--policy", "--rig"};
+// Names of the validators that mark options.
+constexpr const char *kInput = "input file", *kOutput = "output file";
 
-template <typename Names>
-bool is_among(const Names& names, const CLI::Option* option) {
-  return std::find(names.begin(), names.end(), option->get_name()) != names.end();
+bool is_marked(CLI::Option* option, const char* mark) {
+  try {
+    option->get_validator(mark);
+    return true;
+  } catch (const CLI::OptionNotFound&) {
+    return false;
+  }
 }
 
 /// Returns the path of the regular file that a text names, even if it does not exist yet. Returns an empty text for
@@ -55,25 +54,111 @@ std::string file_named(const std::string& text) {
   return fs::weakly_canonical(fs::absolute(text, error), error).string();
 }
 
-}  // namespace
+/// Returns the texts that may be names of files in the value of an option for inputs: FILE, FILE#K,
+/// FILE@LATITUDE,LONGITUDE, FILE=SHARE, or several of these, separated by commas.
+std::vector<std::string> names_in(const std::string& value) {
+  std::vector<std::string> names{value};
+  for (const std::string& piece : CLI::detail::split(value, ',')) {
+    names.push_back(piece);
+    names.push_back(piece.substr(0, piece.find_last_of("#@=")));
+  }
+  return names;
+}
 
-void reject_shared_files(const CLI::App& app) {
+/// Whether the path is the file or pipe behind stdout. Devices are not compared: /dev/null discards both outputs.
+bool is_stdout(const std::string& path) {
+  struct stat file{}, out{};
+  return ::stat(path.c_str(), &file) == 0 && ::fstat(STDOUT_FILENO, &out) == 0 && !S_ISCHR(out.st_mode) &&
+         file.st_dev == out.st_dev && file.st_ino == out.st_ino;
+}
+
+void reject_shared_files(CLI::App* command) {
   std::map<std::string, std::string> name_of_file;  // key: file; value: name of the option
-  for (const bool writes : {false, true}) {
-    for (const CLI::Option* option : app.get_options()) {
-      if (writes ? !is_among(kOutputs, option) : !is_among(kInputs, option)) continue;
-      for (const std::string& text : option->results()) {
-        const std::string file = file_named(text);
-        if (file.empty()) continue;
-        const auto [other, is_new] = name_of_file.emplace(file, option->get_name());
-        if (!is_new && writes) {
-          fail_usage("{}: expected a file different from that of {}, got '{}'", option->get_name(), other->second,
-                     text);
-        }
+  const auto all = command->get_options();
+  for (CLI::Option* const option : all) {
+    if (!is_marked(option, kInput)) continue;
+    for (const std::string& value : option->results()) {
+      for (const std::string& name : names_in(value)) name_of_file.emplace(file_named(name), option->get_name());
+    }
+  }
+  name_of_file.erase("");
+  for (CLI::Option* const option : all) {
+    if (!is_marked(option, kOutput)) continue;
+    for (const std::string& text : option->results()) {
+      const std::string file = file_named(text);
+      if (file.empty()) continue;
+      const auto [other, is_new] = name_of_file.emplace(file, option->get_name());
+      if (!is_new) {
+        fail_usage("{}: expected a file different from that of {}, got '{}'", option->get_name(), other->second, text);
       }
     }
   }
-  for (const CLI::App* each : app.get_subcommands()) reject_shared_files(*each);
+}
+
+void check_outputs(CLI::App* command) {
+  const CLI::Option* const json = command->get_option_no_throw("--json");
+  const bool prints_json = json && json->count() > 0;
+  const auto all = command->get_options();
+  std::set<std::string> named;
+  for (const CLI::Option* const option : all) {
+    for (const std::string& text : option->results()) named.insert(file_named(text));
+  }
+  named.erase("");
+  for (CLI::Option* const option : all) {
+    if (!is_marked(option, kOutput)) continue;
+    for (const std::string& text : option->results()) {
+      if (prints_json && is_stdout(text)) {
+        fail_usage("{}: expected a file other than stdout, where --json prints, got '{}'", option->get_name(), text);
+      }
+      if (!named.contains(fs::path(file_named(text)).parent_path().string())) const OutputFile opened(text);
+    }
+  }
+}
+
+}  // namespace
+
+CLI::Validator input_file() {
+  return CLI::Validator([](const std::string&) { return std::string(); }, "").name(kInput);
+}
+
+CLI::Validator output_file(const std::vector<std::string>& endings, Ending ending) {
+  auto complaint = [endings, ending](const std::string& text) -> std::string {
+    const std::string own = fs::path(text).extension().string();
+    const bool is_known = std::find(endings.begin(), endings.end(), own) != endings.end();
+    if (endings.empty() || is_known || (own.empty() && ending == Ending::optional)) return "";
+    return fmt::format("expected a name that ends in {}, got '{}'", fmt::join(endings, " or "), text);
+  };
+  return CLI::Validator(complaint, "").name(kOutput);
+}
+
+void check_files(CLI::App* app) {
+  reject_shared_files(app);
+  for (CLI::App* const each : app->get_subcommands()) check_files(each);
+  check_outputs(app);
+}
+
+OutputFolder::OutputFolder(const std::string& path) {
+  std::error_code error;
+  for (fs::path each = fs::absolute(path, error); !each.empty() && !fs::exists(each, error); each = each.parent_path())
+    created_.push_back(each.string());
+  make_output_folder(path);
+}
+
+OutputFolder::~OutputFolder() {
+  std::error_code not_empty;
+  for (const std::string& folder : created_) fs::remove(folder, not_empty);
+}
+
+void call_all(const std::vector<std::function<void()>>& functions) {
+  std::exception_ptr first;
+  for (const std::function<void()>& function : functions) {
+    try {
+      function();
+    } catch (...) {
+      if (!first) first = std::current_exception();
+    }
+  }
+  if (first) std::rethrow_exception(first);
 }
 
 void reject_empty_values(CLI::App* command) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "pictura/cli/file_options.h"
 #include "pictura/map/map_copy.h"
 
 namespace pictura {
@@ -42,6 +43,7 @@ CLI::Option* add_map_list_option(CLI::App* command, std::vector<std::string>* ma
   std::string otherwise;
   for (const std::string& map : *maps) otherwise += (otherwise.empty() ? "" : ",") + map;
   return command->add_option_function<std::vector<std::string>>("--map", split, help)
+      ->check(input_file())
       ->allow_extra_args(false)
       ->type_name("MAP")
       ->default_str(otherwise);

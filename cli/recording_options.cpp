@@ -1,5 +1,6 @@
 #include "pictura/cli/recording_options.h"
 
+#include "pictura/cli/file_options.h"
 #include "pictura/cli/number_options.h"
 #include "pictura/common/error.h"
 
@@ -25,6 +26,16 @@ void reject_recording_options(const CLI::App& command, const std::string& needed
   for (const char* option : {"--follow", "--cameras"}) {
     if (command.count(option) > 0) fail_usage("{}: has no effect without {}", option, needed);
   }
+}
+
+void write_replay_files(const Replay& replay, const std::string& page, const std::string& mcap) {
+  const auto write_page = [&] {
+    if (!page.empty()) write_replay_with_message(page, replay);
+  };
+  const auto write_messages = [&] {
+    if (!mcap.empty()) write_mcap_with_message(mcap, replay);
+  };
+  call_all({write_page, write_messages});
 }
 
 }  // namespace pictura

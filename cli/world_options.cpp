@@ -111,6 +111,7 @@ void add_driving_options(CLI::App* command, WorldOptions* world_out, int* steps_
                    "ahead), or a checkpoint or safetensors file written by train; in recorded scenes also log (repeats "
                    "the recording, the default there), inverse (takes the actions that follow the recording most "
                    "closely), idm (follows recorded paths and vehicles ahead)")
+      ->check(input_file())
       ->capture_default_str();
   OtherShares& others = world_out->others;
   add_number_option(command, "--blind", others.blind,

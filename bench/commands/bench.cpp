@@ -8,6 +8,7 @@
 
 #include <fmt/ranges.h>
 
+#include "pictura/cli/file_options.h"
 #include "pictura/cli/map_options.h"
 #include "pictura/cli/report.h"
 #include "pictura/commit.h"
@@ -122,9 +123,11 @@ void report_benchmark(bool json, const BenchContext& context, const std::vector<
 }
 
 void add_compare_option(CLI::App* command, std::optional<EarlierReport>* earlier) {
-  command->add_option_function<std::string>(
-      "--compare", [earlier](const std::string& path) { earlier->emplace(path); },
-      "Also print the ratios to an earlier result: a file with the output of --json");
+  command
+      ->add_option_function<std::string>(
+          "--compare", [earlier](const std::string& path) { earlier->emplace(path); },
+          "Also print the ratios to an earlier result: a file with the output of --json")
+      ->check(input_file());
 }
 
 void add_bench_command(CLI::App& app) {

@@ -139,7 +139,7 @@ void add_quality_benchmark(CLI::App& bench) {
       command, "--random", arguments->random,
       "Measure this many random scenes of each kind (bench/truth/random_scenes.h) instead, from --seed on", 1);
   command->add_option("--figure", arguments->figure, "Write crops of all methods to this PNG file")
-      ->check(file_ending(".png"));
+      ->check(output_file({".png"}));
   command->add_flag("--json", arguments->json, "Print one JSON object");
   command->footer(
       "Examples:\n  pictura bench quality --map Town03 --size 96x54 --views 10 --figure quality.png\n"

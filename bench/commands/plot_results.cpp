@@ -8,9 +8,9 @@
 namespace pictura {
 
 void add_plot_options(CLI::App* command, const std::string& description, PlotArguments* arguments) {
-  command->add_option("--plot", arguments->results, description)->delimiter(',');
+  command->add_option("--plot", arguments->results, description)->delimiter(',')->check(input_file());
   command->add_option("--figure", arguments->figure, "Picture of --plot: a PNG or .svg")
-      ->check(file_ending(".png", ".svg"));
+      ->check(output_file({".png", ".svg"}));
 }
 
 bool has_plot_arguments(const PlotArguments& arguments) {

@@ -117,6 +117,16 @@ class Typing(CommandCase):
         self.assert_refused(2, "--renderer: has no effect with the policy 'random'", "simulate", town, "--renderer", "null")
         self.assert_refused(2, "--film-width: has no effect without --video", "simulate", town, "--film-width", 9)
         self.assert_refused(2, "expected at most 1 together", "simulate", town, "--pedestrians", 1, "--cyclists", 1)
+        self.assert_refused(1, "are too many for more than", "simulate", town, "--steps", 10**9, "--replay", self.folder / "a.html")
+
+    def test_names_of_devices_are_checked(self):
+        for device in ("foo", "cpu:0", "cuda:x", "cuda:-1"):
+            for command in (["simulate", "procedural:1", "--policy", "no.ckpt"], ["evaluate", "no.ckpt"], ["probe", "corner", "no.ckpt"]):
+                self.assert_refused(2, f"--device: expected one of cpu, cuda, cuda:N, auto; got '{device}'", *command, "--device", device)
+
+    def test_channels_are_whole_numbers(self):
+        export = ["export", "no.ckpt", "--out", self.folder / "a.safetensors", "--channels"]
+        self.assert_refused(2, "--channels: expected a whole number of 1 to 4096, got '-1'", *export, "-1")
 
     def test_a_given_share_reduces_default_shares(self):
         facts = self.json_of("simulate", self.town(), "--agents", 6, "--steps", 1, "--pedestrians", 1)
@@ -217,16 +227,88 @@ class Files(CommandCase):
 
     def test_two_options_cannot_write_one_file(self):
         town, page = self.town(blocks="1x1"), self.folder / "page"
-        for first, second in [("--replay", "--mcap"), ("--mcap", "--scene"), ("--policy", "--replay")]:
+        for first, second in [("--replay", "--mcap"), ("--policy", "--replay")]:
             with self.subTest(first=first, second=second):
                 self.assert_refused(2, "expected a file different from that of --", "simulate", town, first, page, second, page)
         relative = [os.path.abspath(PICTURA), "simulate", town, "--replay", "page", "--mcap", "./page"]
         self.assertEqual(subprocess.run(relative, cwd=self.folder, stderr=subprocess.DEVNULL).returncode, 2)
         self.assertFalse(page.exists())
         self.json_of("simulate", town, "--agents", 2, "--steps", 2, "--replay", "/dev/null", "--mcap", "/dev/null")
-        before = town.stat().st_ino
-        self.json_of("map", town, "--xodr", town)  # a map may be replaced
-        self.assertNotEqual(town.stat().st_ino, before)
+
+    def test_outputs_do_not_replace_inputs(self):
+        town, scene = self.town(blocks="1x1"), self.folder / "a.scenario"
+        expected = "expected a file different from that of "
+        simulate = ["simulate", town, "--agents", 2, "--steps", 2]
+        self.json_of(*simulate, "--scene", scene)
+        before = scene.read_bytes()
+        self.assert_refused(2, f"--xodr: {expected}MAP", "map", town, "--xodr", town)
+        self.assert_refused(2, f"--scene: {expected}MAP", "simulate", scene, "--scene", scene)
+        self.assert_refused(2, f"--scene: {expected}MAP", "simulate", f"{scene}#0", "--scene", scene)
+        womd = ["evaluate", "--policy", "idm", "--protocol", "womd", "--scenes", scene]
+        self.assert_refused(2, f"--out: {expected}--scenes", *womd, "--out", scene)
+        self.assert_refused(2, f"--rollouts: {expected}--scenes", *womd, "--rollouts", scene)
+        self.assert_refused(2, f"--out: {expected}--merge", "evaluate", "--merge", "a.json", "b.json", "--out", "a.json")
+        self.assert_refused(2, f"--out: {expected}--map", "evaluate", "--policy", "idle", "--map", f"procedural:1,{town}", "--out", town)
+        self.assert_refused(2, f"--out: {expected}--others", "evaluate", "--policy", "idle", "--others", "a.ckpt=0.2", "--out", "a.ckpt")
+        self.assertEqual(scene.read_bytes(), before)
+        self.assertTrue(town.read_text().startswith("<?xml"))
+
+    def test_outputs_are_checked_before_the_run(self):
+        simulate = ["simulate", "procedural:1:blocks=1x1", "--agents", 2, "--steps", 2]
+        evaluate = ["evaluate", "--policy", "idle", "--map", "procedural:1:blocks=1x1", "--agents", 2, "--steps", 2, "--scenarios", 1]
+        for command, option, path in [
+            (simulate, "--replay", "/nodir/x.html"),
+            (simulate, "--mcap", "/nodir/x.mcap"),
+            (evaluate, "--out", "/nodir/x.json"),
+            (evaluate, "--out", self.folder),
+            (evaluate, "--replay", "/nodir/x.html"),
+        ]:
+            with self.subTest(option=option, path=path):
+                result = run(*command, option, path)
+                self.assertEqual(result.returncode, 1, result.stderr)
+                self.assertRegex(result.stderr, f"^error: {path}: cannot be written: .*\n$")  # nothing before it
+        self.assert_refused(2, "--scene: expected a name that ends in .scenario, got 'x'", *simulate, "--scene", "x")
+
+    def test_a_report_is_printed_and_other_files_are_written_if_a_file_fails(self):
+        for command, full, other in [
+            (["simulate", "procedural:1:blocks=1x1", "--agents", 2, "--steps", 2], "--replay", "--mcap"),
+            (["replay", "procedural:1:blocks=1x1", "--agents", 2, "--steps", 2], "--out", "--mcap"),
+            (["evaluate", "--policy", "idle", "--map", "procedural:1:blocks=1x1", "--agents", 2, "--steps", 2, "--scenarios", 1], "--infractions", "--out"),
+        ]:
+            with self.subTest(command[0]):
+                path = self.folder / f"{command[0]}.mcap"
+                result = run(*command, "--json", full, "/dev/full", other, path)
+                self.assertEqual((result.returncode, path.exists()), (1, True), result.stderr)
+                self.assertIn("error: /dev/full: cannot be written: No space left on device", result.stderr)
+                self.assertTrue(json.loads(result.stdout))
+
+    @needs_ffmpeg
+    def test_a_film_that_fails_does_not_end_the_simulation(self):
+        # An ffmpeg that ends at once, as on a full disk.
+        (self.folder / "ffmpeg").write_text("#!/bin/sh\necho full >&2; exit 1\n")
+        (self.folder / "ffmpeg").chmod(0o755)
+        result = run("simulate", "procedural:1:blocks=1x1", "--agents", 2, "--steps", 3, "--json", "--video", self.folder / "a.mp4",
+                     PATH=f"{self.folder}:{os.environ['PATH']}")  # fmt: skip
+        self.assertEqual((result.returncode, json.loads(result.stdout)["steps"]), (1, 3), result.stderr)
+        self.assertIn("a.mp4: ffmpeg ended with status 1: full", result.stderr)
+
+    def test_json_is_not_mixed_with_a_file_on_stdout(self):
+        town = ["town", "--blocks", "1x1", "--out", "/dev/stdout"]
+        self.assert_refused(2, "--out: expected a file other than stdout, where --json prints", *town, "--json")
+        self.assertEqual(run(*town).returncode, 0)
+
+    def test_failed_starts_leave_no_folders(self):
+        for arguments in [
+            ("render", "procedural:1", "--agents", 2, "--views", 3, "--out", self.folder / "new/images"),
+            ("replay", "procedural:1", "--steps", 10**6, "--gallery", self.folder / "new/gallery"),
+            ("evaluate", "no.ckpt", "--replays", 1, "--gallery", self.folder / "new/gallery"),
+            ("probe", "corner", "no.ckpt", "--out", self.folder / "new/probe"),
+            *([("train", "--config", CONFIGS / "smoke.toml", "--out", self.folder / "new/run", more, value) for more, value in
+              (("--resume", "--json"), ("--init-from", "no.ckpt"))] if has_torch() else []),
+        ]:  # fmt: skip
+            with self.subTest(arguments[0]):
+                self.assertIn(run(*arguments).returncode, (1, 2))
+                self.assertFalse((self.folder / "new").exists())
 
     def test_the_contact_sheet_of_many_views_has_pages(self):
         out = self.folder / "images"
