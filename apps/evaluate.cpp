@@ -18,6 +18,7 @@
 #include "pictura/cli/world_options.h"
 #include "pictura/common/error.h"
 #include "pictura/common/support/numbers.h"
+#include "pictura/common/support/suggestion.h"
 #include "pictura/driving/replay_scenarios.h"
 #include "pictura/evaluation/estimate_json.h"
 #include "pictura/evaluation/infractions.h"
@@ -240,6 +241,26 @@ EvaluateReport merged(const std::vector<std::string>& paths) {
   return report;
 }
 
+// Throws UsageError if a name occurs twice.
+void reject_repeated(const char* option, std::vector<std::string> names) {
+  std::sort(names.begin(), names.end());
+  const auto twice = std::adjacent_find(names.begin(), names.end());
+  if (twice != names.end()) fail_usage("{}: '{}' is given twice", option, *twice);
+}
+
+// Rejects repeated names of other drivers, and misspelt names that would be read as files.
+void check_others(const std::vector<std::string>& others) {
+  std::vector<std::string> known = town_controller_names(), names;
+  for (const std::string& name : impairment_names()) known.push_back(name);
+  for (const std::string& text : others) {
+    const std::string& name = names.emplace_back(text.substr(0, text.rfind('=')));
+    if (std::find(known.begin(), known.end(), name) != known.end() || std::filesystem::exists(name)) continue;
+    if (const std::string near = suggestion(name, known); !near.empty())
+      fail_usage("--others: expected {}, or a policy's file, got '{}'{}", fmt::join(known, ", "), name, near);
+  }
+  reject_repeated("--others", names);
+}
+
 struct EvaluateArguments {
   EvaluateOptions evaluation;
   std::vector<std::string> densities{kDensityNames.begin(), kDensityNames.end()};
@@ -287,6 +308,18 @@ void check_severities(const CLI::App& command, const EvaluateArguments& argument
                  "with several values of --camera-severity");
 }
 
+// Rejects a followed agent that worlds of some density lack, because any scenario may be the worst one.
+void check_followed(const EvaluateArguments& arguments) {
+  const EvaluateOptions& evaluation = arguments.evaluation;
+  int num_agents = evaluation.agents_per_world > 0 ? evaluation.agents_per_world : kMaxAgentsPerWorld;
+  for (const Density density : evaluation.densities) {
+    if (evaluation.agents_per_world == 0)
+      num_agents = std::min(num_agents, kDensityAgents[static_cast<size_t>(density)]);
+  }
+  const int followed = arguments.recording.followed.value_or(0);
+  if (followed >= num_agents) fail_usage("--follow: expected 0 to {}, got {}", num_agents - 1, followed);
+}
+
 // Evaluates at each severity, in the same worlds. Ends early after an interrupt.
 Reports evaluate_severities(const std::vector<double>& severities, EvaluateOptions* evaluation) {
   EvaluationProgress progress("the completed scenarios", "--scenarios A:B evaluates a range");
@@ -311,7 +344,10 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
   const bool merges = !arguments->parts.empty(), lists_infractions = !arguments->infractions.empty();
   evaluation.densities.clear();
   for (const std::string& name : arguments->densities) evaluation.densities.push_back(density_named(name));
-  if (evaluation.agents_per_world > 0) evaluation.densities.resize(1);
+  if (evaluation.agents_per_world > 0) {
+    reject_options(command, {"--density"}, "with --agents, which replaces it");
+    evaluation.densities.resize(1);
+  }
   check_driver(evaluation, merges, /*has_scenes=*/false);
   const bool records = !arguments->replay.empty() || !arguments->gallery.empty();
   if (!records) reject_recording_options(command, "--replay or --gallery");
@@ -319,6 +355,8 @@ void evaluate_in_towns(const CLI::App& command, EvaluateArguments* arguments) {
     fail_usage("--others: cannot be combined with --replay, --gallery or --infractions");
   }
   check_severities(command, *arguments);
+  check_others(evaluation.others);
+  check_followed(*arguments);
   std::optional<OutputFolder> gallery;
   if (!arguments->gallery.empty()) {
     gallery.emplace(arguments->gallery);
@@ -363,6 +401,7 @@ void run_evaluate(const CLI::App& command, EvaluateArguments* arguments) {
     evaluation.width_px = pixels.first;
     evaluation.height_px = pixels.second;
   }
+  reject_repeated("--density", arguments->densities);
   if (arguments->scenes.protocol == kRobustProtocol) {
     if (command.count("--scenarios") > 0) parse_scenarios(arguments->scenarios, &evaluation);
     check_driver(evaluation, /*has_parts=*/false, /*has_scenes=*/false);

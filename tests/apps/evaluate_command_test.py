@@ -42,7 +42,7 @@ class Evaluation(CommandCase):
     def test_an_evaluation_in_parts_is_merged_exactly(self):
         out = self.folder / "run"
         self.json_of("train", *TINY, "--set", "train.updates=1", "--out", out)
-        evaluate = ["evaluate", out / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 4, "--density", "light",
+        evaluate = ["evaluate", out / "checkpoint.ckpt", "--map", "procedural:1", "--agents", 4,
                     "--steps", 5, "--out"]  # fmt: skip
         paths = {name: self.folder / f"{name}.json" for name in ["whole", "a", "b", "merged"]}
         whole = self.json_of(*evaluate, paths["whole"], "--scenarios", 3)["rows"]
@@ -155,7 +155,7 @@ class Evaluation(CommandCase):
     def test_evaluation_has_its_keys(self):
         out = self.folder / "run"
         self.json_of("train", *TINY, "--set", "train.updates=1", "--out", out)
-        result = self.json_of("evaluate", "--map", "procedural:1", out / "checkpoint.ckpt", "--density", "light", "--agents", 8,
+        result = self.json_of("evaluate", "--map", "procedural:1", out / "checkpoint.ckpt", "--agents", 8,
                               "--scenarios", 2, "--steps", 40, "--device", "cpu")  # fmt: skip
         keys = """density scenarios steps at_fault_collision_rate off_road_rate red_light_rate goals_per_vehicle
                   collision_rate wall_contact_rate km_per_infraction km_per_at_fault_infraction km_driven""".split()

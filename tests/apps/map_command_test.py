@@ -200,7 +200,7 @@ class MapCases(CommandCase):
         if not has_torch():
             self.skipTest("built without torch")
         names = ",".join(map(str, MAP_CASES))
-        few = ["--map", names, "--agents", 4, "--steps", 30, "--density", "light", "--scenarios", len(MAP_CASES)]
+        few = ["--map", names, "--agents", 4, "--steps", 30, "--scenarios", len(MAP_CASES)]
         self.assertEqual(self.json_of("evaluate", "--policy", "lane", *few)["rows"][0]["scenarios"], len(MAP_CASES))
         maps = json.dumps([str(path) for path in MAP_CASES])
         self.json_of("train", *TINY, "--set", f"simulator.maps={maps}", "--set", f"simulator.num_slots={3 * len(MAP_CASES)}",

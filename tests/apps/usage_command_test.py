@@ -117,6 +117,14 @@ class Typing(CommandCase):
         self.assert_refused(2, "--renderer: has no effect with the policy 'random'", "simulate", town, "--renderer", "null")
         self.assert_refused(2, "--film-width: has no effect without --video", "simulate", town, "--film-width", 9)
         self.assert_refused(2, "expected at most 1 together", "simulate", town, "--pedestrians", 1, "--cyclists", 1)
+        evaluate = ["evaluate", "--policy", "idle"]
+        self.assert_refused(2, "--density: has no effect with --agents", *evaluate, "--agents", 2, "--density", "light")
+        self.assert_refused(2, "--density: 'light' is given twice", *evaluate, "--density", "light,light")
+        self.assert_refused(2, "--others: 'lane' is given twice", *evaluate, "--others", "lane=.2,lane=.2")
+        self.assert_refused(2, "got 'lan'; did you mean 'lane'?", *evaluate, "--others", "lan=0.2")
+        replay = [*evaluate, "--replay", self.folder / "a.html", "--follow"]
+        self.assert_refused(2, "--follow: expected 0 to 11, got 12", *replay, 12, "--agents", 12)
+        self.assert_refused(2, "--follow: expected 0 to 59, got 60", *replay, 60)
         self.assert_refused(1, "are too many for more than", "simulate", town, "--steps", 10**9, "--replay", self.folder / "a.html")
 
     def test_names_of_devices_are_checked(self):
