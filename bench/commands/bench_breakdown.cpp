@@ -301,6 +301,7 @@ void add_breakdown_benchmark(CLI::App& bench) {
   add_number_option(command, "--chunk", arguments->chunk,
                     "Transitions per network pass, fewer if memory does not suffice", 1, 1 << 30);
   command->add_option("--device", arguments->device, "Device of the network: cpu, cuda, cuda:N, auto")
+      ->check(device_name())
       ->capture_default_str();
   command->add_option("--simulator", arguments->simulator, "cpu, cuda, auto")->capture_default_str();
   command->add_flag("--host-steps", arguments->host_steps,
@@ -315,7 +316,10 @@ void add_breakdown_benchmark(CLI::App& bench) {
       "Examples:\n  pictura bench breakdown --host-steps --json\n"
       "  pictura bench breakdown --backend gl:egl --samples 1,2x2 --size 96x54 --agents 256 --updates 1\n"
       "  pictura bench breakdown --plot RESULTS.json --figure breakdown.png");
-  command->callback([arguments] { run_breakdown(*arguments); });
+  command->callback([arguments, command] {
+    if (!has_plot_arguments(arguments->plot)) check_default_config(*command, arguments->measured.config_path);
+    run_breakdown(*arguments);
+  });
 }
 
 }  // namespace pictura

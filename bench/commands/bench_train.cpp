@@ -110,7 +110,10 @@ void add_train_benchmark(CLI::App& bench) {
       "  pictura bench train --plot bench/results/gpu_ranks.json --figure ranks.png\n"
       "  pictura bench train --config configs/paper.toml --set train.forward_chunk=8192 --init-from policy.ckpt "
       "--json");
-  command->callback([arguments] { run_train(*arguments); });
+  command->callback([arguments, command] {
+    if (!has_plot_arguments(arguments->plot)) check_default_config(*command, arguments->measured.config_path);
+    run_train(*arguments);
+  });
 }
 
 }  // namespace pictura

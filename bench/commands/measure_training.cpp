@@ -43,6 +43,11 @@ void check_update(const TrainProgress& progress) {
 
 }  // namespace
 
+void check_default_config(const CLI::App& command, const std::string& path) {
+  if (command.count("--config") > 0 || std::filesystem::exists(path)) return;
+  fail_usage("--config: the default, {}, exists only in the root of the repository: expected a TOML file", path);
+}
+
 TrainingMeasurement measure_training(const TrainingCase& training_case) {
   const TemporaryFolder folder;
   TrainingMeasurement result;

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
+
 #include "pictura/bench/commands/bench.h"
 #include "pictura/training/kernel_profile.h"
 #include "pictura/training/loop.h"
@@ -24,6 +26,10 @@ struct TrainingMeasurement {
   std::vector<KernelTime> kernels;
   TrainReport report;
 };
+
+/// Throws UsageError if --config was not given and its default `path`, which is relative to the repository's root, does
+/// not exist.
+void check_default_config(const CLI::App& command, const std::string& path);
 
 /// Trains in a temporary folder, at a constant learning rate. Throws Error if an update took no agent-step or no
 /// minibatch. Throws Error if the unchanged policy's action probabilities differ between rollout and learning. Throws

@@ -231,6 +231,12 @@ class Benchmarks(CommandCase):
 
 
 class TrainingBenchmarks(CommandCase):
+    def test_the_default_configuration_is_named_where_it_does_not_exist(self):
+        for command in ("train", "breakdown"):
+            result = run("bench", command, cwd=self.folder)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertRegex(result.stderr, r"--config: the default, configs/\w+\.toml, exists only in the root of the repository")
+
     def test_bench_train_prints_simulator_renderer_and_device(self):
         facts = self.json_of("bench", "train", "--updates", 2, "--config", CONFIGS / "smoke.toml", "--renderer", "null",
                              "--device", "cpu")  # fmt: skip
