@@ -26,7 +26,6 @@ class ScenarioRecorder final : public EvaluationObserver {
 
   void begin(Simulator& simulator) override {
     if (driver_.renderer) upload_maps(simulator, driver_.renderer);
-    options_.followed = std::min(options_.followed.value_or(0), simulator.num_slots() - 1);
     recording_.emplace(simulator, driver_, options_);
   }
   void before_step(Span<const Command> commands) override { recording_->before_step(commands); }
