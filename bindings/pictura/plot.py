@@ -934,7 +934,10 @@ def _write(path: str, content: bytes) -> None:
     """Writes a temporary file and renames it, so that no reader sees a partial file. Other targets than regular files
     are written directly."""
     if path.startswith(("/dev/", "/proc/")) or (os.path.exists(path) and not os.path.isfile(path)):
-        pathlib.Path(path).write_bytes(content)
+        try:
+            pathlib.Path(path).write_bytes(content)
+        except OSError as error:  # errors of writing, unlike those of opening, lack the path
+            raise OSError(error.errno, error.strerror, path) from None
         return
     target = os.path.realpath(path)
     if os.path.exists(target) and not os.access(target, os.W_OK):

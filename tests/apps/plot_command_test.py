@@ -73,6 +73,7 @@ class Plots(CommandCase):
         self.assert_refused(1, "nowhere: expected the folder of a training run", "plot", self.folder / "nowhere", *out)
         self.assert_refused(1, "a/progress.csv: expected a column 'charts/episode_return'", "plot", a, *out)
         self.assert_refused(1, "/proc/nowhere", "plot", a, "--metrics", "update", "--out", "/proc/nowhere/curves.png")
+        self.assert_refused(1, "/dev/full: No space left on device", "plot", a, "--metrics", "update", "--out", "/dev/full")
         self.assert_refused(2, "--x", "plot", a, "--x", "days", *out)
         self.assert_refused(2, "RUN", "plot", *out)
         self.assert_refused(2, "expected a name that ends in .png or .svg", "plot", a, "--out", self.folder / "curves.pdf")
