@@ -19,8 +19,9 @@ void add_train_command(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("train", "Train a policy by self-play (PPO)");
   command
-      ->add_option("--config", arguments->train.config_path,
-                   "TOML file; configs/ contains smoke.toml, demo.toml, town01.toml, agent.toml and paper.toml")
+      ->add_option(
+          "--config", arguments->train.config_path,
+          "TOML file; configs/ contains smoke.toml, demo.toml, town01.toml, scenes.toml, agent.toml and paper.toml")
       ->required();
   command
       ->add_option("--set", arguments->train.overrides,
