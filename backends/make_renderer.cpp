@@ -1,5 +1,6 @@
 #include "pictura/backends/make_renderer.h"
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
 
@@ -44,7 +45,7 @@ class NullRenderer final : public Renderer {
       for (std::size_t view = 0; view < views.size(); ++view) {
         auto* first =
             static_cast<uint8_t*>(camera.data) + view * static_cast<std::size_t>(camera.view_stride) * value_bytes;
-        const int64_t values = image_values({camera.width_px, camera.height_px}, images_out.order);
+        const int64_t values = image_values({camera.width_px, camera.height_px}, images_out.order, images_out.patch_px);
         std::memset(first, 0, static_cast<std::size_t>(values) * value_bytes);
         for (std::size_t i = view * pixels; i < (view + 1) * pixels; ++i) {
           if (camera.depth_m) camera.depth_m[i] = std::numeric_limits<float>::infinity();
@@ -83,6 +84,10 @@ std::vector<std::string> renderer_names() {
 
 std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererConfig& config,
                                         std::string* choice_out) {
+  const std::vector<std::string> names = renderer_names();
+  if (std::find(names.begin(), names.end(), name) == names.end()) {
+    fail_usage("renderer: expected one of {}; got '{}'", joined(names), name);
+  }
   auto chosen = [&](const std::string& choice) {
     if (choice_out) *choice_out = choice;
   };
@@ -108,12 +113,11 @@ std::unique_ptr<Renderer> make_renderer(const std::string& name, const RendererC
     return make_cuda("requested");
   }
   const std::string why_not_cuda = !config.device.is_host() ? unavailable : "scenes and images lie in host memory";
-  if (name == "auto" && why_not_cuda.empty()) return make_cuda("a device was found");
+  if (why_not_cuda.empty()) return make_cuda("a device was found");
 #else
   const std::string why_not_cuda = "this build has no CUDA";
 #endif
-  if (name == "auto") return chosen(fmt::format("cpu: {}", why_not_cuda)), make_cpu_renderer(config);
-  fail_usage("renderer: expected one of {}; got '{}'", joined(renderer_names()), name);
+  return chosen(fmt::format("cpu: {}", why_not_cuda)), make_cpu_renderer(config);
 }
 
 }  // namespace pictura

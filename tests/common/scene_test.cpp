@@ -9,6 +9,7 @@
 #include "pictura/backends/make_renderer.h"
 #include "pictura/common/error.h"
 #include "pictura/common/raster/shapes.h"
+#include "pictura/tests/support/error_message.h"
 
 namespace pictura {
 namespace {
@@ -69,6 +70,8 @@ TEST(Renderers, AnUnknownNameListsTheKnownOnes) {
   } catch (const UsageError& error) {
     EXPECT_THAT(error.what(), testing::AllOf(testing::HasSubstr("cpu"), testing::HasSubstr("'vulkan'")));
   }
+  EXPECT_THAT(test::message_of([] { make_renderer("vulkan", {.samples = {.grid = 2}}); }),
+              testing::HasSubstr("renderer: expected one of cpu"));
 }
 
 TEST(Renderers, AutoReportsItsChoice) {
@@ -86,6 +89,10 @@ TEST(Renderers, NullDrawsBlack) {
   const std::vector<View> views(2);
   renderer->render({}, views, images.batch());
   for (const uint8_t byte : images.bytes()) ASSERT_EQ(byte, 0);
+  HostImages patches(config.rig, 2, PixelFormat::bf16, Planes::none, ChannelOrder::patches, 12);
+  for (uint8_t& byte : patches.bytes()) byte = 7;
+  renderer->render({}, views, patches.batch());
+  for (const uint8_t byte : patches.bytes()) ASSERT_EQ(byte, 0);
   // ... in the images of the counted views.
   std::fill(images.bytes().begin(), images.bytes().end(), uint8_t{7});
   const int32_t count = 1;
