@@ -112,6 +112,7 @@ void Film::add_frame(Simulator& simulator) {
   const RgbImage top = draw_world(parts.painter, simulator, 0, parts.agent, parts.width_m, caption);
   paste(top, 0, 0, &parts.frame);
   parts.renderer->render(simulator.scene(), simulator.views().subspan(parts.agent, 1), parts.images.batch());
+  if (!has_body(simulator.state().status[parts.agent])) std::ranges::fill(parts.images.bytes(), uint8_t{0});
   for (size_t i = 0; i < parts.order.size(); ++i) {
     const int camera = parts.order[i], column = static_cast<int>(i) % kColumns, row = static_cast<int>(i) / kColumns;
     const std::string& name = parts.renderer->config().rig.cameras[camera].name;

@@ -12,7 +12,7 @@
 namespace pictura {
 
 struct FilmOptions {
-  int agent = 0;        // followed agent
+  int agent = 0;        // followed agent; while it is absent, its images are black
   float width_m = 150;  // width of the view around the agent; 0: the whole map
   /// Settings of the policy's images. Default: the cameras of paper_rig().
   std::optional<RendererConfig> trained_view;

@@ -337,8 +337,10 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
     paint_goal(canvas, pixel_at(agent.center_m), pixel_at(goal.position_m), agent.agent_class);
   }
 
+  const auto status_of = [&frame](size_t i) { return frame.status.empty() ? AgentStatus::active : frame.status[i]; };
+  const auto is_shown = [&](size_t i) { return frame.agents[i].drawn && has_body(status_of(i)); };
   const bool has_highlight = frame.highlighted >= 0 && static_cast<size_t>(frame.highlighted) < frame.agents.size();
-  if (has_highlight) {
+  if (has_highlight && is_shown(static_cast<size_t>(frame.highlighted))) {
     const AgentBox& agent = frame.agents[frame.highlighted];
     std::vector<Vector2d> waypoints;
     for (const Vec2 waypoint : frame.waypoints_m) waypoints.push_back(pixel_at(waypoint));
@@ -346,8 +348,8 @@ RgbImage WorldPainter::draw(const WorldFrame& frame, const TopCamera& camera) {
   }
 
   for (size_t i = 0; i < frame.agents.size(); ++i) {
-    const auto status = frame.status.empty() ? AgentStatus::active : frame.status[i];
-    if (!frame.agents[i].drawn || !has_body(status)) continue;
+    if (!is_shown(i)) continue;
+    const AgentStatus status = status_of(i);
     const Vector2d position = pixel_at(frame.agents[i].center_m);
     paint_agent(canvas, frame.agents[i], status, position, camera.px_per_m);
     const HaltReason* reason =
@@ -402,7 +404,7 @@ RgbImage draw_world(WorldPainter& painter, Simulator& simulator, int world, int 
   frame.caption = caption;
   std::vector<Vec2> waypoints;
   TopCamera camera = painter.whole_map();
-  if (followed >= 0) {
+  if (followed >= 0 && has_body(status[followed])) {
     const size_t slot = first_slot + static_cast<size_t>(followed);
     for (int i = std::max(0, state.next_waypoint[slot]); i < kNumWaypoints; ++i) {
       const size_t at = slot * kNumWaypoints + static_cast<size_t>(i);

@@ -40,7 +40,7 @@ struct WorldFrame {
   Span<const AgentStatus> status;   // [agents]; empty: all active
   Span<const uint8_t> halt_reason;  // [agents] Event bits; shown as a ring and in the legend
   Span<const AgentGoal> goals;      // joined to the agent by a thin line
-  int highlighted = -1;             // agent with a halo and waypoints_m; -1: none
+  int highlighted = -1;             // agent with a halo and waypoints_m if it is drawn; -1: none
   Span<const Vec2> waypoints_m;     // remaining waypoints of the highlighted agent, nearest first
   Span<const WorldMark> marks;      // later marks cover earlier marks
   std::string caption;              // top left line, or empty
@@ -74,7 +74,7 @@ class WorldPainter {
 };
 
 /// Draws one world of a simulator in host memory. `followed`: index of the highlighted agent in this world, or -1. If
-/// follow_width_m > 0, the camera follows it.
+/// follow_width_m > 0, the camera follows it. While it is absent, the whole map is shown.
 RgbImage draw_world(WorldPainter& painter, Simulator& simulator, int world, int followed = -1, float follow_width_m = 0,
                     const std::string& caption = {});
 

@@ -158,6 +158,11 @@ TEST(WorldPainter, SkipsAbsentAgentsAndDimsHaltedOnes) {
   EXPECT_EQ(at(image, 185, 200), kVehicleBody);
   EXPECT_EQ(at(image, 285, 150), kGround);
 
+  for (const int hidden : {1, 3}) {
+    frame.highlighted = hidden;
+    EXPECT_EQ(painter.draw(frame, painter.around({500, 400}, 40)).rgb, image.rgb) << hidden;
+  }
+
   frame.status = Span<const AgentStatus>(status).subspan(0, 3);
   EXPECT_THAT(test::message_of([&] { painter.draw(frame, painter.whole_map()); }), HasSubstr("4 agents, got 3"));
 }
@@ -335,6 +340,7 @@ class StillSimulator final : public Simulator {
     arrays_.state.waypoint_y_m = waypoint_y_m_.data();
   }
   void set_device(Device device) { arrays_.device = device; }
+  void set_status(int slot, AgentStatus status) { status_[slot] = status; }
   void set_worlds(CompiledMaps, std::vector<GeometryHandle>, std::vector<WorldSpec>, uint64_t, Stream) override {}
   void reserve(const SimulatorCapacity&) override {}
   SpawnReport spawn_report(Stream) const override { return {}; }
@@ -388,6 +394,9 @@ TEST(DrawWorld, ShowsTheAgentsOfOneWorldAndFollowsOne) {
   EXPECT_EQ(count(draw_world(painter, simulator, 0), halo), 0);
   EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 2); }), HasSubstr("[0, 2), got 2"));
   EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 1, 2); }), HasSubstr("below 2, got 2"));
+  simulator.set_status(2, AgentStatus::waiting);
+  EXPECT_EQ(draw_world(painter, simulator, 1, 0, 40).rgb, draw_world(painter, simulator, 1).rgb)
+      << "no absent agent is followed";
   simulator.set_device({MemorySpace::cuda, 0});
   EXPECT_THAT(test::message_of([&] { draw_world(painter, simulator, 1); }), HasSubstr("host memory"));
 }
