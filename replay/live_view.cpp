@@ -37,7 +37,10 @@ struct LiveView::Parts {
   LiveJson agent_message() { return world.agent_message(decide(watched), watched); }
 
   void apply(const LiveRequest& asked) {
-    if (asked.paused) paused = *asked.paused;
+    if (asked.paused) {
+      paused = *asked.paused;
+      steps_asked = 0;
+    }
     if (asked.steps) {
       paused = true;
       steps_asked = *asked.steps;

@@ -144,6 +144,17 @@ class Http(Served):
         late = Events(self.address)
         self.assertEqual(late.next("begin")["step"], looks[2]["step"])
         self.assertTrue(late.next("status")["paused"])
+        # A pause ends the requested steps.
+        self.control({"steps": 1000})
+        self.control({"paused": True})
+        at = []
+        for _ in range(2):
+            time.sleep(0.3)
+            watching = Events(self.address)
+            at.append(watching.next("begin")["step"])
+            watching.close()
+        self.assertEqual(at[0], at[1])
+        self.assertLess(at[1], looks[2]["step"] + 1000)
         events.close()
         late.close()
 
