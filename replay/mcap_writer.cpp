@@ -82,16 +82,17 @@ uint16_t McapWriter::add_channel(std::string_view topic, std::string_view schema
   put_text(schema_name, &content);
   put_text("jsonschema", &content);
   put_text(schema, &content);
-  std::string records = record(Op::schema, content);
+  const std::string schema_record = record(Op::schema, content);
   content.clear();
   put_fixed(id, &content);
   put_fixed(id, &content);
   put_text(topic, &content);
   put_text("json", &content);
   put_text("", &content);  // no metadata
-  records += record(Op::channel, content);
-  definitions_ += records;
-  chunk_ += records;
+  const std::string channel_record = record(Op::channel, content);
+  schemas_ += schema_record;
+  channels_ += channel_record;
+  chunk_ += schema_record + channel_record;
   return id;
 }
 
@@ -170,7 +171,7 @@ void McapWriter::finish() {
   put_fixed(uint32_t{0}, &content);  // no checksum over all data
   put(record(Op::data_end, content));
   const uint64_t summary_begin = offset_;
-  std::string summary = definitions_;
+  std::string summary = schemas_ + channels_;
   content.clear();
   put_fixed(num_messages_, &content);
   put_fixed(num_channels_, &content);  // number of schemas

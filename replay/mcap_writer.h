@@ -35,7 +35,7 @@ class McapWriter {
 
   OutputFile file_;
   uint64_t offset_ = 0;
-  std::string definitions_;  // schemas and channels, for the summary
+  std::string schemas_, channels_;  // for the summary, whose records must be grouped by kind
   std::string metadata_indexes_;
   uint16_t num_channels_ = 0;
   std::string chunk_;
