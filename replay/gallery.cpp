@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 #include <vector>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/filled_folder.h"
 #include "pictura/replay/file.h"
 #include "pictura/replay/page_sources.h"
 #include "pictura/replay/template.h"
@@ -27,13 +29,14 @@ int64_t infractions_of(const Json& header) {
   return sum;
 }
 
-// Returns the index entries of all pages in the folder, in the order of their names.
-std::vector<Json> entries_of(const std::string& folder) {
+// Returns the index entries of all pages in the folder that are not in `without`, in the order of their names.
+std::vector<Json> entries_of(const std::string& folder, const std::set<std::string>& without = {}) {
   PICTURA_CHECK(std::filesystem::is_directory(folder), "{}: expected a folder of replays", folder);
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
-    if (entry.path().extension() == ".html" && name != kIndex) names.push_back(name);
+    const bool is_page = entry.path().extension() == ".html" && name != kIndex;
+    if (is_page && !without.contains(name)) names.push_back(name);
   }
   std::sort(names.begin(), names.end());
   std::vector<Json> entries;
@@ -67,7 +70,7 @@ void check_index(const std::string& folder) {
 }  // namespace
 
 void check_gallery(const std::string& folder) {
-  entries_of(folder);
+  entries_of(folder, filled_files(folder, "gallery"));
   check_index(folder);
 }
 

@@ -24,17 +24,29 @@ constexpr char kEnd = '\0';
 // folder.
 bool is_plain(const std::string& name) { return !name.empty() && fs::path(name).filename() == name; }
 
+std::string list_of(const std::string& folder, const std::string& kind) {
+  return (fs::path(folder) / (".pictura-" + kind)).string();
+}
+
 }  // namespace
 
+std::set<std::string> filled_files(const std::string& folder, const std::string& kind) {
+  const std::string list = list_of(folder, kind);
+  std::set<std::string> names;
+  if (!fs::exists(list)) return names;
+  const std::string text = read_file(list);
+  for (size_t begin = 0, end; (end = text.find(kEnd, begin)) != std::string::npos; begin = end + 1) {
+    names.insert(text.substr(begin, end - begin));
+  }
+  return names;
+}
+
 FilledFolder::FilledFolder(std::string folder, const std::string& kind)
-    : folder_(std::move(folder)), list_((fs::path(folder_) / (".pictura-" + kind)).string()) {
+    : folder_(std::move(folder)), list_(list_of(folder_, kind)) {
   make_output_folder(folder_);
   list_file_.reset(::open(list_.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666));
   PICTURA_CHECK(list_file_.get() >= 0, "{}: cannot be opened: {}", list_, std::strerror(errno));
-  const std::string text = read_file(list_);
-  for (size_t begin = 0, end; (end = text.find(kEnd, begin)) != std::string::npos; begin = end + 1) {
-    listed_.insert(text.substr(begin, end - begin));
-  }
+  listed_ = filled_files(folder_, kind);
 }
 
 std::string FilledFolder::file(const std::string& name) {

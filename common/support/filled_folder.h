@@ -9,6 +9,9 @@
 
 namespace pictura {
 
+/// Returns the names of the files with which a FilledFolder of this kind has filled the folder.
+std::set<std::string> filled_files(const std::string& folder, const std::string& kind);
+
 /// A folder that a command fills. Files of earlier calls are removed unless they are written again. The hidden file
 /// .pictura-KIND lists the written files. Other files stay.
 class FilledFolder {
