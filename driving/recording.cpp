@@ -125,7 +125,9 @@ void Recording::before_step(Span<const Command> commands) {
 
 void Recording::after_step(const StepResult& result) { parts_->recorder.after_step(result); }
 
-Replay Recording::finish() { return parts_->recorder.finish(origin_of(parts_->driver)); }
+Replay Recording::finish(std::vector<int32_t>* agent_of_out) {
+  return parts_->recorder.finish(origin_of(parts_->driver), agent_of_out);
+}
 
 void write_replay_with_message(const std::string& path, const Replay& replay) {
   write_replay(path, replay);

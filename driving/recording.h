@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pictura/common/renderer.h"
 #include "pictura/common/support/filled_folder.h"
@@ -16,7 +17,7 @@ class PolicySession;
 struct DrivenWorld;
 
 struct RecordingOptions {
-  std::optional<int> followed;  // if empty, resolve_followed() chooses the agent
+  std::optional<int> followed;  // slot; if empty, resolve_followed() chooses it
   bool cameras = false;
 };
 
@@ -49,8 +50,8 @@ class Recording final : public StepObserver {
   void before_step(Span<const Command> commands) override;
   void after_step(const StepResult& result) override;
 
-  /// Ends the recording.
-  Replay finish();
+  /// Ends the recording. agent_of_out: as in Recorder::finish().
+  Replay finish(std::vector<int32_t>* agent_of_out = nullptr);
 
  private:
   struct Parts;

@@ -1,6 +1,7 @@
 #include "pictura/driving/replay_cases.h"
 
 #include <cmath>
+#include <vector>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/messages.h"
@@ -110,18 +111,25 @@ void write(const CaseReplayOptions& options, const ProbeResults& results, size_t
   compare_speed(options.path, replay, frame, place.ego, place.ego_speed_mps);
 }
 
-// Simulates the case's scene again, and writes the replay.
+// Simulates the case's scene again, and writes the replay. describe(agents) returns the case, given the replay's agent
+// of each slot in the case's frame.
+template <typename Describe>
 void write_scene(const CaseReplayOptions& options, const ProbeOptions& probe, const ProbeResults& results,
-                 size_t number, const CasePlace& place, ReplayCase probed) {
+                 size_t number, CasePlace place, Describe&& describe) {
   RecordingOptions recording = options.recording;
   recording.followed = place.ego;
   ScenarioCounts counts;
-  Replay replay = record_scenario(driven_by(probe, place), scenario_of(probe, results, place), recording, &counts);
+  std::vector<int32_t> agent_of;
+  Replay replay =
+      record_scenario(driven_by(probe, place), scenario_of(probe, results, place), recording, &counts, &agent_of);
   if (place.step >= replay.num_frames) {
     fail("--replay: case {} is at step {} of scenario {}, which ended after {} steps when driven again: {}", number,
          place.step, place.scene, replay.num_frames - 1, kWhyOtherwise);
   }
-  write(options, results, number, place, place.step, std::move(probed), std::move(replay));
+  const int num_slots = static_cast<int>(agent_of.size()) / replay.num_frames;
+  const Span<const int32_t> agents = Span<const int32_t>(agent_of).subspan(place.step * num_slots, num_slots);
+  place.ego = agents[place.ego];
+  write(options, results, number, place, place.step, describe(agents), std::move(replay));
 }
 
 }  // namespace
@@ -134,8 +142,13 @@ void check_case_number(const CaseReplayOptions& options, int64_t count) {
 void write_case_replay(const CaseReplayOptions& options, const RemovalOptions& probe, const RemovalResults& results) {
   const size_t number = chosen_case(options, results);
   const RemovalCase& one = results.cases[number];
-  write_scene(options, probe, results, number, place_of(one),
-              {.what = about(one, results.control), .removed = one.hidden});
+  write_scene(options, probe, results, number, place_of(one), [&](Span<const int32_t> agents) {
+    RemovalCase shown = one;
+    for (int32_t* agent : {&shown.ego, &shown.user, &shown.hidden}) {
+      if (*agent >= 0) *agent = agents[*agent];
+    }
+    return ReplayCase{.what = about(shown, results.control), .removed = shown.hidden};
+  });
 }
 
 void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions& probe,
@@ -143,7 +156,7 @@ void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions
   const size_t number = chosen_case(options, results);
   const PedestrianPoint& point = results.points[number];
   const PedestrianPath& path = results.paths[point.path];
-  ReplayCase probed{.what = about(point, path, results.control)};
+  ReplayCase probed;
   if (results.control != PedestrianControl::unchanged) {
     probed.inserted = replay_box(point.pedestrian);
     const auto first = results.points.begin() + path.first_point;
@@ -152,7 +165,12 @@ void write_case_replay(const CaseReplayOptions& options, const PedestrianOptions
       probed.path_cm.push_back({place.x_cm, place.y_cm});
     }
   }
-  write_scene(options, probe, results, number, place_of(path), std::move(probed));
+  write_scene(options, probe, results, number, place_of(path), [&](Span<const int32_t> agents) {
+    PedestrianPath shown = path;
+    shown.ego = agents[path.ego];
+    probed.what = about(point, shown, results.control);
+    return probed;
+  });
 }
 
 void write_case_replay(const CaseReplayOptions& options, const CornerOptions& probe, const CornerResults& results) {

@@ -30,7 +30,7 @@ class ScenarioRecorder final : public EvaluationObserver {
   }
   void before_step(Span<const Command> commands) override { recording_->before_step(commands); }
   void after_step(const StepResult& result) override { recording_->after_step(result); }
-  Replay finish() { return recording_->finish(); }
+  Replay finish(std::vector<int32_t>* agent_of_out) { return recording_->finish(agent_of_out); }
 
  private:
   const RecordedDriver driver_;
@@ -162,7 +162,8 @@ std::vector<ScenarioPlace> worst_scenarios(const EvaluationResults& results, int
 }
 
 Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& scenario,
-                       const RecordingOptions& recording, ScenarioCounts* counts_out) {
+                       const RecordingOptions& recording, ScenarioCounts* counts_out,
+                       std::vector<int32_t>* agent_of_out) {
   EvaluateOptions one = options_of(options, scenario);
   const std::unique_ptr<PolicySession> session = session_of(one);
   // The policy's responses for the followed agent need a separate renderer that has the scenario's map.
@@ -170,7 +171,7 @@ Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& s
   ScenarioRecorder recorder({session ? one.checkpoint : one.controller, session.get(), renderer.get()}, recording);
   one.observer = &recorder;
   *counts_out = drive(one, scenario, session.get());
-  return recorder.finish();
+  return recorder.finish(agent_of_out);
 }
 
 Replay record_takeover(const EvaluateOptions& options, const RecordedScenario& scenario,

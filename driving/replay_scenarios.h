@@ -34,9 +34,10 @@ struct RecordedTakeover {
 };
 
 /// Simulates a scenario again on the host. A policy may drive differently than in its evaluation, because
-/// floating-point results depend on batch size and device.
+/// floating-point results depend on batch size and device. agent_of_out: as in Recorder::finish().
 Replay record_scenario(const EvaluateOptions& options, const RecordedScenario& scenario,
-                       const RecordingOptions& recording, ScenarioCounts* counts_out);
+                       const RecordingOptions& recording, ScenarioCounts* counts_out,
+                       std::vector<int32_t>* agent_of_out = nullptr);
 
 /// Records a scenario from the takeover on, until its steps are done or its agent has an infraction. Throws Error if
 /// the scenario ends before the takeover.

@@ -258,7 +258,7 @@ std::vector<int32_t> columns_from(NumberReader reader, size_t frames, size_t col
   return values;
 }
 
-constexpr int kLightOrder = 1, kDecisionOrder = 1;
+constexpr int kLightOrder = 1, kDecisionOrder = 1, kFollowedOrder = 1;
 constexpr int32_t kMaxImage_px = 8192;  // maximum width and height, as for the cameras of a rig
 
 struct Section {
@@ -280,6 +280,9 @@ std::vector<Section> sections_of(const Replay& replay) {
   }
   if (!replay.decisions.empty()) {
     sections.push_back({"decisions", column_bytes(replay.decisions.data(), frames, kDecisionValues, kDecisionOrder)});
+  }
+  if (!replay.followed_agents.empty()) {
+    sections.push_back({"followed", column_bytes(replay.followed_agents.data(), frames, 1, kFollowedOrder)});
   }
   return sections;
 }
@@ -563,6 +566,8 @@ Replay replay_from(std::string_view page) {
       replay.lights.assign(lights.begin(), lights.end());
     } else if (name == "decisions") {
       replay.decisions = columns_from(reader, frames, kDecisionValues, kDecisionOrder);
+    } else if (name == "followed") {
+      replay.followed_agents = columns_from(reader, frames, 1, kFollowedOrder);
     } else {
       const auto* track =
           std::find_if(kTracks.begin(), kTracks.end(), [&](const TrackInfo& t) { return t.name == name; });

@@ -78,7 +78,7 @@ void LiveWorld::after_reset(Span<const uint8_t> world_mask) {
 
 void LiveWorld::keep_newest(size_t num_episodes) {
   begins_episode_ = recorder_.recorded().episodes.size() > num_episodes;
-  recorder_.discard_history();
+  entered_ = recorder_.discard_history();
   ++step_;  // number of the frame, as pages count
 }
 
@@ -92,13 +92,21 @@ LiveJson LiveWorld::begin() const {
 
 LiveJson LiveWorld::frame() const {
   const Replay& replay = recorder_.recorded();
-  LiveJson chains = LiveJson::array(), metrics;
-  for (const ReplayChain& chain : replay.episodes.back().chains) {
+  const ReplayEpisode& episode = replay.episodes.back();
+  LiveJson chains = LiveJson::array(), entered = LiveJson::array(), metrics;
+  for (const ReplayChain& chain : episode.chains) {
     LiveJson values{chain.agent};
     for (const auto* places : {&chain.x_cm, &chain.y_cm, &chain.z_cm}) {
       for (const int32_t value : *places) values.push_back(value);
     }
     chains.push_back(values);
+  }
+  for (const int32_t agent : entered_) {
+    LiveJson values = body_json(episode.agents[agent]);
+    values.insert(values.begin(), agent);
+    const float* conditioning = episode.conditioning.data() + int64_t{agent} * kNumConditioning;
+    for (size_t i = 0; i < kNumConditioning; ++i) values.push_back(conditioning[i]);
+    entered.push_back(values);
   }
 #define X(name) metrics[#name] = replay.metrics.name;
   PICTURA_REPLAY_METRICS(X)
@@ -107,7 +115,8 @@ LiveJson LiveWorld::frame() const {
           {"tracks", replay.tracks},
           {"lights", replay.lights},
           {"chains", chains},
-          {"episode", begins_episode_ ? episode_json(replay.episodes.back()) : LiveJson(nullptr)},
+          {"episode", begins_episode_ ? episode_json(episode) : LiveJson(nullptr)},
+          {"entered", entered},
           {"metrics", metrics}};
 }
 

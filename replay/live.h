@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -43,6 +44,7 @@ class LiveWorld final : public StepObserver {
   std::unique_ptr<AgentCameras> cameras_;
   int64_t step_ = 0;
   bool begins_episode_ = false;
+  std::vector<int32_t> entered_;  // agents that entered in the newest frame
 };
 
 /// Request of a page; empty members change nothing.

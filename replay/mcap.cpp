@@ -244,7 +244,6 @@ void write_mcap(const std::string& path, const Replay& replay) {
   const uint16_t agents = writer.add_channel("/agents", "foxglove.SceneUpdate", scene);
   const uint16_t lights = writer.add_channel("/lights", "foxglove.SceneUpdate", scene);
   const uint16_t events = writer.add_channel("/events", "foxglove.Log", log_schema().dump());
-  const int followed = std::max(0, replay.followed);
   const uint16_t agent_channel = writer.add_channel("/agent", "pictura.Agent", agent_schema().dump());
   std::vector<uint16_t> cameras;
   const int num_pictured = replay.num_pictured_frames();
@@ -270,7 +269,7 @@ void write_mcap(const std::string& path, const Replay& replay) {
         !std::equal(now, now + static_cast<ptrdiff_t>(num_lights), now - static_cast<ptrdiff_t>(num_lights))) {
       writer.add_message(lights, ns, json_text(lights_json(replay, frame, ns)));
     }
-    writer.add_message(agent_channel, ns, json_text(agent_json(replay, frame, followed)));
+    writer.add_message(agent_channel, ns, json_text(agent_json(replay, frame, std::max(0, replay.followed_at(frame)))));
     for (int agent = 0; agent < replay.num_agents; ++agent) {
       const int32_t bits = replay.at(Track::events, frame, agent);
       std::string names;

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "pictura/backends/make_renderer.h"
 #include "pictura/backends/upload_maps.h"
 #include "pictura/common/error.h"
+#include "pictura/common/support/messages.h"
 #include "pictura/replay/images.h"
 #include "pictura/replay/map_shapes.h"
 #include "pictura/replay/units.h"
@@ -32,39 +34,28 @@ ReplayBody body_of(const AgentBox& box) {
 
 /// A life (the time from an agent's entry to its exit) that began in the middle of an episode.
 struct LaterLife {
-  size_t episode = 0;  // index among the replay's episodes
-  int32_t frame = 0, agent = 0;
+  size_t episode = 0;           // index among the replay's episodes
+  int32_t slot = 0, agent = 0;  // agent: index in the finished replay
   ReplayBody body;
   std::vector<float> conditioning;
 };
 
-/// Turns each later life into a separate agent. The new agents follow the existing agents. `lives` are in the order of
-/// their frames.
-void split_lives(const std::vector<LaterLife>& lives, Replay* replay_inout) {
+/// Sets the body and the conditioning of an episode's agent to those of a life.
+void set_agent(const LaterLife& life, int32_t agent, ReplayEpisode* episode_inout) {
+  episode_inout->agents[agent] = life.body;
+  std::copy(life.conditioning.begin(), life.conditioning.end(),
+            episode_inout->conditioning.begin() + int64_t{agent} * kNumConditioning);
+}
+
+/// Turns each later life into a separate agent. agent_of: [frames, slots] index of each slot's agent, below num_agents.
+void split_lives(const std::vector<LaterLife>& lives, const std::vector<int32_t>& agent_of, int32_t num_agents,
+                 Replay* replay_inout) {
   if (lives.empty()) return;
   Replay& replay = *replay_inout;
   const int32_t num_slots = replay.num_agents;
-  std::vector<int32_t> column(lives.size());  // agent index of each life
-  std::vector<int32_t> next(replay.episodes.size(), num_slots);
-  for (size_t i = 0; i < lives.size(); ++i) column[i] = next[lives[i].episode]++;
-  const int32_t num_agents = *std::max_element(next.begin(), next.end());
-  check_replay_room(num_agents, int64_t{replay.num_frames});
-
-  // Index of the agent at each frame and slot.
-  std::vector<int32_t> agent_of(static_cast<size_t>(replay.num_frames) * static_cast<size_t>(num_slots));
   const auto at = [num_slots](int32_t frame, int32_t slot) {
     return static_cast<size_t>(frame) * static_cast<size_t>(num_slots) + static_cast<size_t>(slot);
   };
-  for (int32_t frame = 0; frame < replay.num_frames; ++frame) {
-    for (int32_t slot = 0; slot < num_slots; ++slot) agent_of[at(frame, slot)] = slot;
-  }
-  for (size_t i = 0; i < lives.size(); ++i) {
-    const ReplayEpisode& episode = replay.episodes[lives[i].episode];
-    for (int32_t frame = lives[i].frame; frame < episode.first_frame + episode.num_frames; ++frame) {
-      agent_of[at(frame, lives[i].agent)] = column[i];
-    }
-  }
-
   const auto frames = static_cast<size_t>(replay.num_frames), agents = static_cast<size_t>(num_agents);
   for (size_t which = 0; which < kNumTracks; ++which) {
     const bool is_status = static_cast<Track>(which) == Track::status;
@@ -82,15 +73,17 @@ void split_lives(const std::vector<LaterLife>& lives, Replay* replay_inout) {
     episode.conditioning.resize(agents * kNumConditioning);
     for (ReplayChain& chain : episode.chains) chain.agent = agent_of[at(chain.frame, chain.agent)];
   }
-  for (size_t i = 0; i < lives.size(); ++i) {
-    ReplayEpisode& episode = replay.episodes[lives[i].episode];
-    episode.agents[column[i]] = lives[i].body;
-    std::copy(lives[i].conditioning.begin(), lives[i].conditioning.end(),
-              episode.conditioning.begin() + int64_t{column[i]} * kNumConditioning);
+  for (const LaterLife& life : lives) set_agent(life, life.agent, &replay.episodes[life.episode]);
+  for (int32_t frame = 0; frame < replay.num_frames && replay.followed >= 0; ++frame) {
+    replay.followed_agents.push_back(agent_of[at(frame, replay.followed)]);
   }
   auto& first = replay.first_infraction;
   if (first.frame >= 0) first.agent = agent_of[at(first.frame, first.agent)];
   replay.num_agents = num_agents;
+}
+
+int64_t max_frames(int num_agents, int64_t max_numbers) {
+  return max_numbers / (std::max(1, num_agents) * int64_t{kNumTracks});
 }
 
 }  // namespace
@@ -147,6 +140,7 @@ struct Recorder::Parts {
   Parts(Simulator& its_simulator, const RecorderOptions& options)
       : simulator(its_simulator),
         world(options.world),
+        max_numbers(options.max_numbers),
         setup(simulator.config(), simulator.maps(), simulator.handles(), simulator.worlds()) {
     take_seed();
     first_slot = setup.slot_begin[world];
@@ -154,6 +148,7 @@ struct Recorder::Parts {
     num_boxes = setup.box_begin[static_cast<size_t>(world) + 1] - first_box;
     first_light = setup.light_begin[world];
     replay.num_agents = setup.slot_begin[static_cast<size_t>(world) + 1] - first_slot;
+    max_agents = replay.num_agents;
     replay.num_lights = setup.light_begin[static_cast<size_t>(world) + 1] - first_light;
     replay.followed = options.followed;
     replay.map = map_shapes(setup.map_of(world));
@@ -188,7 +183,15 @@ struct Recorder::Parts {
     }
     replay.episodes.push_back(std::move(next));
     chains.assign(replay.num_agents, -1);
-    lives.assign(replay.num_agents, 0);
+    lives.assign(state.life + slot(0), state.life + slot(replay.num_agents));
+    reset_agents();
+  }
+
+  // Makes each slot's agent the agent of the slot's number.
+  void reset_agents() {
+    agents.resize(replay.num_agents);
+    std::iota(agents.begin(), agents.end(), 0);
+    next_agent = replay.num_agents;
   }
 
   void begin_life(const AgentStateView& state, const AgentBox& box, int32_t agent) {
@@ -196,9 +199,11 @@ struct Recorder::Parts {
     lives[agent] = state.life[at];
     chains[agent] = -1;
     const float* conditioning = state.conditioning + at * kNumConditioning;
+    agents[agent] = next_agent++;
+    max_agents = std::max(max_agents, next_agent);
     later_lives.push_back({replay.episodes.size() - 1,
-                           replay.num_frames,
                            agent,
+                           agents[agent],
                            body_of(box),
                            {conditioning, conditioning + kNumConditioning}});
   }
@@ -220,6 +225,7 @@ struct Recorder::Parts {
     const bool begins = new_episode || replay.episodes.empty() || episode().index != simulator.episode_index()[world];
     if (begins) begin_episode(state, boxes);
     for (int32_t agent = 0; agent < replay.num_agents; ++agent) add_agent(state, boxes, agent, begins);
+    agent_of.insert(agent_of.end(), agents.begin(), agents.end());
     const Span<const LightState> lights = scene.light_states.subspan(first_light, replay.num_lights);
     for (const LightState light : lights) replay.lights.push_back(static_cast<uint8_t>(light));
     ++episode().num_frames;
@@ -240,10 +246,10 @@ struct Recorder::Parts {
     track(Track::y_m).push_back(absent ? 0 : centimetres(box.center_m.y));
     track(Track::z_m).push_back(absent ? 0 : centimetres(box.center_m.z));
     std::vector<int32_t>& headings = track(Track::heading_deg);
-    const auto agents = static_cast<size_t>(replay.num_agents);
+    const auto count = static_cast<size_t>(replay.num_agents);
     headings.push_back(absent   ? 0
                        : begins ? heading_of(box)
-                                : near_heading(heading_of(box), headings[headings.size() - agents]));
+                                : near_heading(heading_of(box), headings[headings.size() - count]));
     track(Track::speed_mps).push_back(absent ? 0 : centimetres(state.speed_mps[at]));
     track(Track::steer_deg).push_back(absent ? 0 : tenths_of_degree(state.steer_rad[at]));
     if (absent || chains[agent] == state.goal_chains[at]) return;
@@ -257,7 +263,19 @@ struct Recorder::Parts {
     episode().chains.push_back(chain);
   }
 
-  void check_room() const { check_replay_room(replay.num_agents, int64_t{replay.num_frames}); }
+  // Ends the recording before the first frame that would exceed max_numbers.
+  void end_if_full() {
+    if (is_full) return;
+    const AgentStateView state = simulator.state();
+    int32_t entered = 0;
+    for (int32_t agent = 0; agent < replay.num_agents; ++agent) entered += state.life[slot(agent)] > lives[agent];
+    const int32_t num_agents = std::max(max_agents, next_agent + entered);
+    is_full = replay.num_frames >= max_frames(num_agents, max_numbers);
+    if (is_full) {
+      print_message("notice: replay: recorded the first {} steps: {} agents are too many for more\n",
+                    replay.num_frames - 1, num_agents);
+    }
+  }
 
   void add_images() {
     group += cameras->draw(static_cast<int>(slot(replay.followed)));
@@ -313,23 +331,27 @@ struct Recorder::Parts {
 
   Simulator& simulator;
   const int world;
+  const int64_t max_numbers;
   const SimulatorSetup setup;
   std::optional<ReplayDecision> decision;  // for the next step
   std::vector<Command> commands;
   int32_t first_slot = 0, first_box = 0, num_boxes = 0, first_light = 0;
   std::vector<int32_t> chains;  // [agents] number of the last written chain
   std::vector<int32_t> lives;   // [agents] last written life
+  // Each life is an agent of the finished replay: [slots] now, and [frames, slots].
+  std::vector<int32_t> agents, agent_of;
+  int32_t next_agent = 0, max_agents = 0;  // numbers of agents of this episode, and of the finished replay
   std::vector<LaterLife> later_lives;
+  bool is_full = false;
   std::unique_ptr<AgentCameras> cameras;
   std::string group;  // images that are not yet compressed
   Replay replay;
 };
 
 void check_replay_room(int num_agents, int64_t num_steps) {
-  const int64_t max_frames = kMaxReplayNumbers / (std::max(1, num_agents) * int64_t{kNumTracks});
-  PICTURA_CHECK(num_steps + 1 <= max_frames,
-                "replay: {} agents are too many for more than {} steps: record fewer steps", num_agents,
-                max_frames - 1);
+  const int64_t frames = max_frames(num_agents, kMaxReplayNumbers);
+  PICTURA_CHECK(num_steps + 1 <= frames, "replay: {} agents are too many for more than {} steps: record fewer steps",
+                num_agents, frames - 1);
 }
 
 Recorder::Recorder(Simulator& simulator, const RecorderOptions& options) {
@@ -357,6 +379,7 @@ void Recorder::before_step(Span<const Command> commands) {
   Parts& parts = *parts_;
   PICTURA_CHECK(commands.size() == static_cast<size_t>(parts.simulator.num_slots()),
                 "replay: expected {} commands, got {}", parts.simulator.num_slots(), commands.size());
+  if (parts.is_full) return;
   const auto agents = static_cast<size_t>(parts.replay.num_agents);
   const Span<const Command> of_world = commands.subspan(parts.slot(0), agents);
   parts.commands.assign(of_world.begin(), of_world.end());
@@ -365,7 +388,8 @@ void Recorder::before_step(Span<const Command> commands) {
 
 void Recorder::after_step(const StepResult& result) {
   Parts& parts = *parts_;
-  parts.check_room();
+  parts.end_if_full();
+  if (parts.is_full) return;
   parts.add_step(result);
   parts.add_frame();
 }
@@ -374,7 +398,8 @@ void Recorder::after_reset(Span<const uint8_t> world_mask) {
   Parts& parts = *parts_;
   if (!world_mask.empty() && !world_mask[static_cast<size_t>(parts.world)]) return;
   parts.decision.reset();
-  parts.check_room();
+  parts.end_if_full();
+  if (parts.is_full) return;
   parts.take_seed();
   parts.add_no_step();
   parts.add_frame(/*new_episode=*/true);
@@ -395,12 +420,14 @@ void Recorder::set_origin(ReplayOrigin origin) {
   parts.replay.origin = std::move(origin);
 }
 
-void Recorder::discard_history() {
-  Replay& replay = parts_->replay;
+std::vector<int32_t> Recorder::discard_history() {
+  Parts& parts = *parts_;
+  Replay& replay = parts.replay;
   PICTURA_CHECK(replay.followed < 0, "replay: frames with decisions or images cannot be discarded");
   const auto keep_last = [](auto& values, int32_t count) { values.erase(values.begin(), values.end() - count); };
   for (std::vector<int32_t>& track : replay.tracks) keep_last(track, replay.num_agents);
   keep_last(replay.lights, replay.num_lights);
+  const size_t last_episode = replay.episodes.size() - 1;
   keep_last(replay.episodes, 1);
   ReplayEpisode& episode = replay.episodes.back();
   episode.first_frame = 0;
@@ -417,17 +444,28 @@ void Recorder::discard_history() {
   episode.chains = std::move(kept);
   replay.first_infraction = {};
   replay.num_frames = 1;
-  parts_->later_lives.clear();
+  std::vector<int32_t> entered;
+  for (const LaterLife& life : parts.later_lives) {
+    if (life.episode != last_episode) continue;
+    set_agent(life, life.slot, &episode);
+    entered.push_back(life.slot);
+  }
+  parts.later_lives.clear();
+  parts.reset_agents();
+  parts.agent_of = parts.agents;
+  parts.max_agents = replay.num_agents;
+  return entered;
 }
 
-Replay Recorder::finish(ReplayOrigin origin) {
+Replay Recorder::finish(ReplayOrigin origin, std::vector<int32_t>* agent_of_out) {
   Parts& parts = *parts_;
   set_origin(std::move(origin));
   if (!parts.replay.decisions.empty()) {
     parts.replay.decisions.resize(static_cast<size_t>(parts.replay.num_frames) * kDecisionValues);
   }
   if (parts.cameras) parts.end_group();
-  split_lives(parts.later_lives, &parts.replay);
+  split_lives(parts.later_lives, parts.agent_of, parts.max_agents, &parts.replay);
+  if (agent_of_out) *agent_of_out = std::move(parts.agent_of);
   return std::move(parts.replay);
 }
 

@@ -16,9 +16,10 @@ namespace pictura {
 
 struct RecorderOptions {
   int world = 0;
-  int followed = -1;          // agent with decisions and images; -1: none
-  RendererConfig cameras;     // for viewers
-  bool keeps_images = false;  // drawn by the CPU renderer
+  int followed = -1;                        // slot in the world whose agents have decisions and images; -1: none
+  RendererConfig cameras;                   // for viewers
+  bool keeps_images = false;                // drawn by the CPU renderer
+  int64_t max_numbers = kMaxReplayNumbers;  // maximum number of track values
 };
 
 class AgentCameras {
@@ -48,11 +49,10 @@ ReplayDecision decision_of(Span<const float> logits, float value);
 
 ReplayBox replay_box(const AgentBox& box);
 
-/// Throws Error if a replay of this size would exceed kMaxReplayNumbers. Recorder::after_step() throws only once the
-/// limit is reached.
+/// Throws Error if a replay of this size would exceed kMaxReplayNumbers.
 void check_replay_room(int num_agents, int64_t num_steps);
 
-/// Records one world.
+/// Records one world. At RecorderOptions::max_numbers, prints a notice and ignores later frames.
 class Recorder final : public StepObserver {
  public:
   /// The current state is the first frame. The simulator must outlive the recorder. Throws UsageError if the simulator
@@ -63,7 +63,6 @@ class Recorder final : public StepObserver {
   /// Records the response for the next step.
   void decide(const ReplayDecision& decision);
   void before_step(Span<const Command> commands) override;
-  /// Throws Error if the replay would exceed kMaxReplayNumbers.
   void after_step(const StepResult& result) override;
   /// Begins an episode if this world is in the mask.
   void after_reset(Span<const uint8_t> world_mask = {}) override;
@@ -72,11 +71,14 @@ class Recorder final : public StepObserver {
   const Replay& recorded() const;
   /// Map, seed, world, step duration and light cycles come from the simulator, not from `origin`.
   void set_origin(ReplayOrigin origin);
-  /// Keeps only the last frame. Metrics continue. Throws Error if the recorder follows an agent.
-  void discard_history();
+  /// Keeps only the last frame. Metrics continue. Returns the slots whose agents entered in the discarded frames or in
+  /// the last frame. Throws Error if the recorder follows an agent.
+  std::vector<int32_t> discard_history();
 
-  /// Returns the complete replay; ends the recorder's use.
-  Replay finish(ReplayOrigin origin);
+  /// Returns the complete replay; ends the recorder's use. Each life (the time from an agent's entry to its exit) that
+  /// began in the middle of an episode is a separate agent, after those of the slots. *agent_of_out: [frames, slots]
+  /// index of each slot's agent.
+  Replay finish(ReplayOrigin origin, std::vector<int32_t>* agent_of_out = nullptr);
 
  private:
   struct Parts;

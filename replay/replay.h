@@ -111,6 +111,7 @@ enum class ShapeKind : uint8_t {
   light,
 };
 constexpr int kNumShapeKinds = 8;
+constexpr size_t kLightPoints = 4;
 
 struct ReplayShape {
   ShapeKind kind = ShapeKind::lane;
@@ -164,7 +165,7 @@ struct ReplayCamera {
   bool operator==(const ReplayCamera&) const = default;
 };
 
-/// Compressed images of the followed agent, from the first frame on. The last group may be smaller.
+/// Compressed images of the followed agents, from the first frame on. The last group may be smaller.
 struct ReplayImages {
   int32_t frames_per_group = 0;
   std::vector<std::string> groups;  // see images.h
@@ -236,7 +237,9 @@ struct Replay {
   ReplayMoment first_infraction;
   std::optional<ReplayCase> probed;
   int32_t num_agents = 0, num_frames = 0, num_lights = 0;
-  int32_t followed = -1;  // agent with decisions and images; -1: none
+  int32_t followed = -1;  // agent with decisions and images in the first frame; -1: none
+  // [frames] agent with decisions and images; empty: `followed`
+  std::vector<int32_t> followed_agents;
   std::vector<ReplayShape> map;
   ReplayScenery scenery;
   std::vector<ReplayCamera> cameras;  // cameras of every agent
@@ -252,6 +255,8 @@ struct Replay {
     return tracks[static_cast<size_t>(track)]
                  [static_cast<size_t>(frame) * static_cast<size_t>(num_agents) + static_cast<size_t>(agent)];
   }
+  /// Returns the agent with decisions and images in a frame, or -1.
+  int32_t followed_at(int frame) const { return followed_agents.empty() ? followed : followed_agents[frame]; }
   /// Returns the number of leading frames with images.
   int num_pictured_frames() const {
     const auto kept = static_cast<int64_t>(images.groups.size()) * images.frames_per_group;

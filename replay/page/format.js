@@ -144,6 +144,7 @@ class Replay {
       else if (name === "conditioning") conditioning = new Float32Array(part.slice().buffer);
       else if (name === "lights") this.lights = reader.columns(lights, frames, 1);
       else if (name === "decisions") this.decisions = reader.columns(13, frames, 1);
+      else if (name === "followed") this.followedAgents = reader.columns(1, frames, 1);
       else {
         const track = orders.get(name);
         if (!track) throw new Damaged(`it has an unknown section ${name}`);
@@ -174,10 +175,12 @@ class Replay {
   isAbsent(agent, frame) { return this.raw("status", agent, frame) === ABSENT; }
   body(agent, frame) { return this.episode(frame).bodies[agent]; }
   light(light, frame) { return this.lights[light * this.stride + frame]; }
-  isFollowed(agent) { return agent === this.followed; }
+  // Returns the agent with decisions and images, or -1.
+  followedAt(frame) { return this.followedAgents ? this.followedAgents[frame] : this.followed; }
+  isFollowed(agent, frame) { return agent === this.followedAt(frame); }
   imagesOf(frame) { return this.images.frame(frame); }
   // Whether the file contains the images of an agent's cameras.
-  hasImages(agent, frame) { return agent === this.followed && Boolean(this.images) && frame < this.images.frames; }
+  hasImages(agent, frame) { return this.isFollowed(agent, frame) && Boolean(this.images) && frame < this.images.frames; }
   // Returns the road user of a probe's case, if an agent's case is shown: whether it is inserted, and the change of the
   // images that removes or adds it.
   caseUser(agent, frame) {
@@ -231,7 +234,7 @@ class Replay {
   }
 }
 
-// Images of the followed agent in the first `frames` frames, group by group.
+// Images of the followed agents in the first `frames` frames, group by group.
 class Images {
   constructor({ cameras, frames, images: { hues, frames_per_group: perGroup, group_bytes } }, bytes) {
     Object.assign(this, { cameras, hues, perGroup, frames: Math.min(frames, perGroup * group_bytes.length), bytes });

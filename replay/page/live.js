@@ -54,7 +54,7 @@ class LiveReplay extends Replay {
   }
   // Adds the frame of a message. Returns the number of frames dropped for it, or null if the frame does not follow the
   // last one.
-  append({ step, tracks, lights, chains, episode, metrics }) {
+  append({ step, tracks, lights, chains, episode, entered, metrics }) {
     if (step !== this.firstStep + this.frames) return null;
     let dropped = 0;
     if (this.frames === this.stride) {
@@ -71,6 +71,11 @@ class LiveReplay extends Replay {
     now.end = frame + 1;
     now.frames = now.end - now.first;
     this.episodeOf[frame] = this.episodes.length - 1;
+    for (const [agent, ...values] of entered) {
+      now.bodies[agent] = this.bodyFrom(values);
+      const count = this.header.conditioning.length;
+      for (let i = 0; i < count; ++i) now.conditioning[agent * count + i] = values[4 + i];
+    }
     for (const [agent, ...cm] of chains) {
       const m = cm.map(value => value / 100), chain = { frame, x_m: m.slice(0, 3), y_m: m.slice(3, 6) }, before = now.chains[agent].at(-1);
       if (!before || before.x_m.some((x, i) => x !== chain.x_m[i]) || before.y_m.some((y, i) => y !== chain.y_m[i])) now.chains[agent].push(chain);
@@ -80,10 +85,10 @@ class LiveReplay extends Replay {
     ++this.version;
     return dropped;
   }
+  bodyFrom([agentClass, length, width, height]) { return { agentClass, length_m: length / 100, width_m: width / 100, height_m: height / 100 }; }
   episodeFrom({ index, bodies, parked, conditioning }, first) {
-    const body = ([agentClass, length, width, height]) => ({ agentClass, length_m: length / 100, width_m: width / 100, height_m: height / 100 });
-    return { index, first, conditioning, bodies: bodies.map(body), chains: bodies.map(() => []),
-      parked: parked.map(car => ({ ...body(car), x_m: car[4] / 100, y_m: car[5] / 100, z_m: car[6] / 100, heading_deg: car[7] / 10 })) };
+    return { index, first, conditioning, bodies: bodies.map(this.bodyFrom), chains: bodies.map(() => []),
+      parked: parked.map(car => ({ ...this.bodyFrom(car), x_m: car[4] / 100, y_m: car[5] / 100, z_m: car[6] / 100, heading_deg: car[7] / 10 })) };
   }
   // Sets the watched agent's images and its policy's response at a step.
   addLook({ step, agent, decision, images }) {

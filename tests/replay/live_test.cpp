@@ -8,7 +8,9 @@
 
 #include "pictura/backends/make_simulator.h"
 #include "pictura/map/load_map.h"
+#include "pictura/map/opendrive/opendrive.h"
 #include "pictura/simulator/controllers/host_controllers.h"
+#include "pictura/tests/map/open_roads.h"
 
 namespace pictura {
 namespace {
@@ -56,6 +58,33 @@ TEST(LiveWorld, SendsTheContentOfARecording) {
   const LiveJson begin = live.begin();
   EXPECT_EQ(begin["step"], 60);
   EXPECT_EQ(begin["header"]["frames"], 1);
+}
+
+TEST(LiveWorld, SendsTheBodiesOfAgentsThatEnter) {
+  SimulatorConfig config;
+  config.num_threads = 1;
+  config.parked_cars = 0;
+  const auto map = std::make_shared<RoadMap>(parse_opendrive(test::open_street(120), "street.xodr"));
+  const auto simulator = make_simulator("cpu", config, {map}, {{0, 4, 0}});
+  const auto controller = make_host_controller("idm_lanes", *simulator, 1);
+  LiveWorld live(*simulator, {}, {}, false);
+  std::vector<Command> commands(4);
+  int64_t entered = 0;
+  for (int step = 0; step < 200; ++step) {
+    controller->act(simulator->arrays(), {}, commands);
+    live.before_step(commands);
+    live.after_step(simulator->step(commands));
+    const LiveJson message = live.frame();
+    for (const LiveJson& agent : message["entered"]) {
+      ++entered;
+      ASSERT_EQ(agent.size(), 5 + kNumConditioning);
+      const size_t slot = agent[0];
+      EXPECT_EQ(agent[2], replay_box(simulator->scene().agents[slot]).body.length_cm);
+      EXPECT_EQ(agent[5], simulator->state().conditioning[slot * kNumConditioning]);
+    }
+  }
+  EXPECT_GT(entered, 0);
+  EXPECT_EQ(entered, simulator->spawn_report().entered);
 }
 
 TEST(LiveWorld, DiscardingKeepsTheNewestChains) {

@@ -37,8 +37,8 @@ constexpr int kWorld = 1, kFirstSlot = 7, kAgents = 30;
 
 /// Drives and records; calls visit(frame, result) at each frame, the first with none.
 template <typename Visit>
-Replay record(Simulator& simulator, const std::string& policy, int steps, const RecorderOptions& options,
-              Visit&& visit) {
+Replay record(Simulator& simulator, const std::string& policy, int steps, const RecorderOptions& options, Visit&& visit,
+              std::vector<int32_t>* agent_of_out = nullptr) {
   const std::unique_ptr<Controller> controller = make_controller(policy, simulator, 9);
   Recorder recorder(simulator, options);
   std::vector<Command> commands(static_cast<size_t>(simulator.num_slots()));
@@ -54,16 +54,23 @@ Replay record(Simulator& simulator, const std::string& policy, int steps, const 
     recorder.after_step(result);
     visit(step + 1, &result, commands);
   }
-  return recorder.finish({.policy = policy});
+  return recorder.finish({.policy = policy}, agent_of_out);
 }
 
-TEST(Recorder, RecordsEachLifeAsAnAgent) {
+constexpr int kStreetAgents = 6;
+
+/// A street that vehicles leave and enter, as the only world.
+std::unique_ptr<Simulator> street() {
   SimulatorConfig config;
   config.num_threads = 1;
   config.parked_cars = 0;
   config.pedestrian_fraction = config.cyclist_fraction = 0;
-  const auto street = std::make_shared<RoadMap>(parse_opendrive(test::open_street(120), "street.xodr"));
-  const auto simulator = make_simulator("cpu", config, {street}, {{0, 6, 0}});
+  const auto map = std::make_shared<RoadMap>(parse_opendrive(test::open_street(120), "street.xodr"));
+  return make_simulator("cpu", config, {map}, {{0, kStreetAgents, 0}});
+}
+
+TEST(Recorder, RecordsEachLifeAsAnAgent) {
+  const auto simulator = street();
   const Replay replay = record(*simulator, "idm_lanes", 300, {}, [](auto&&...) {});
   const SpawnReport report = simulator->spawn_report();
   ASSERT_GT(report.entered, 4);
@@ -87,6 +94,74 @@ TEST(Recorder, RecordsEachLifeAsAnAgent) {
     });
     EXPECT_TRUE(has_chain) << agent;
   }
+}
+
+TEST(Recorder, ContinuesAnEpisodeWithTheLivesOfItsAgents) {
+  const auto simulator = street();
+  const auto nothing = [](auto&&...) {};
+  record(*simulator, "idm_lanes", 200, {}, nothing);
+  const int64_t entered = simulator->spawn_report().entered;
+  ASSERT_GT(entered, 0);
+  const Replay replay = record(*simulator, "idm_lanes", 1, {}, nothing);
+  EXPECT_EQ(replay.num_agents, kStreetAgents + simulator->spawn_report().entered - entered);
+}
+
+TEST(Recorder, FollowsTheAgentsOfASlot) {
+  const auto simulator = street();
+  std::vector<int32_t> x_cm;  // position of the slot's agent; 0 without one
+  std::vector<int32_t> agent_of;
+  const Replay replay = record(
+      *simulator, "idm_lanes", 300, {.followed = 0},
+      [&](auto&&...) {
+        const bool is_there = has_body(simulator->state().status[0]);
+        x_cm.push_back(is_there ? replay_box(simulator->scene().agents[0]).x_cm : 0);
+      },
+      &agent_of);
+  ASSERT_EQ(replay.followed, 0);
+  ASSERT_EQ(replay.followed_agents.size(), 301u);
+  EXPECT_EQ(replay.followed_agents.front(), 0);
+  EXPECT_GE(replay.followed_agents.back(), kStreetAgents);
+  for (int frame = 0; frame < replay.num_frames; ++frame) {
+    const int32_t agent = replay.followed_at(frame);
+    ASSERT_EQ(replay.at(Track::x_m, frame, agent), x_cm[frame]) << frame;
+    ASSERT_EQ(agent_of[frame * kStreetAgents], agent);
+  }
+}
+
+TEST(Recorder, EndsBeforeItsAgentsAreTooManyForItsSteps) {
+  const auto simulator = street();
+  constexpr int64_t kMax = 200 * 10 * int64_t{kNumTracks};
+  const Replay replay = record(*simulator, "idm_lanes", 300, {.max_numbers = kMax}, [](auto&&...) {});
+  const int64_t numbers = int64_t{replay.num_frames} * replay.num_agents * int64_t{kNumTracks};
+  EXPECT_LE(numbers, kMax);
+  EXPECT_GT(numbers, kMax / 2);
+  EXPECT_GT(replay.num_agents, kStreetAgents);
+  EXPECT_LT(replay.num_frames, 301);
+  EXPECT_EQ(replay.tracks[0].size(), static_cast<size_t>(replay.num_frames) * static_cast<size_t>(replay.num_agents));
+}
+
+TEST(Recorder, DiscardingKeepsTheBodiesOfAgentsThatEntered) {
+  const auto simulator = street();
+  const auto controller = make_controller("idm_lanes", *simulator, 9);
+  Recorder recorder(*simulator, {});
+  std::vector<Command> commands(kStreetAgents);
+  size_t entered = 0;
+  for (int step = 0; step < 200; ++step) {
+    controller->act(simulator->arrays(), {}, commands);
+    recorder.before_step(commands);
+    recorder.after_step(simulator->step(Span<const Command>(commands)));
+    entered += recorder.discard_history().size();
+    const ReplayEpisode& episode = recorder.recorded().episodes.back();
+    for (int agent = 0; agent < kStreetAgents; ++agent) {
+      if (!has_body(simulator->state().status[agent])) continue;
+      ASSERT_EQ(episode.agents[agent], replay_box(simulator->scene().agents[agent]).body) << agent;
+      ASSERT_EQ(episode.conditioning[agent * kNumConditioning],
+                simulator->state().conditioning[agent * kNumConditioning]);
+    }
+  }
+  EXPECT_EQ(static_cast<int64_t>(entered), simulator->spawn_report().entered);
+  EXPECT_GT(entered, 0u);
+  EXPECT_EQ(recorder.finish({}).num_agents, kStreetAgents);
 }
 
 TEST(Recorder, SceneryIsTheMapsGeometryToACentimetre) {
