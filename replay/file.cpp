@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <optional>
+#include <set>
 
 #include "pictura/common/error.h"
 #include "pictura/common/support/file.h"
@@ -259,7 +260,8 @@ std::vector<int32_t> columns_from(NumberReader reader, size_t frames, size_t col
 }
 
 constexpr int kLightOrder = 1, kDecisionOrder = 1, kFollowedOrder = 1;
-constexpr int32_t kMaxImage_px = 8192;  // maximum width and height, as for the cameras of a rig
+constexpr int64_t kMaxGroupBytes = int64_t{1} << 31;  // maximum size of decompressed images
+constexpr int32_t kMaxImage_px = 8192;                // maximum width and height, as for the cameras of a rig
 
 struct Section {
   std::string name;
@@ -525,10 +527,42 @@ void read_header_values(const Json& header, Replay* replay_out) {
   header.at("line_floor_px").get_to(replay_out->line_floor_px);
 }
 
-void read_images(const Json& header, std::string_view page, ReplayImages* images_out) {
+// Throws Error unless each frame belongs to one episode, and each light has a shape with its points.
+void check_contents(const Replay& replay) {
+  int32_t frames = 0;
+  for (const ReplayEpisode& episode : replay.episodes) {
+    PICTURA_CHECK(
+        episode.first_frame == frames && episode.num_frames > 0 && episode.num_frames <= replay.num_frames - frames,
+        "episodes: expected an episode of frames {} to at most {}, got {} frames from {} on", frames,
+        replay.num_frames - 1, episode.num_frames, episode.first_frame);
+    frames += episode.num_frames;
+  }
+  PICTURA_CHECK(frames == replay.num_frames, "episodes: expected {} frames, got {}", replay.num_frames, frames);
+  int32_t lights = 0;
+  for (const ReplayShape& shape : replay.map) {
+    if (shape.kind != ShapeKind::light) continue;
+    ++lights;
+    PICTURA_CHECK(shape.points_cm.size() == kLightPoints, "map: expected a light of {} points, got {}", kLightPoints,
+                  shape.points_cm.size());
+  }
+  PICTURA_CHECK(lights == replay.num_lights, "map: expected {} lights, got {}", replay.num_lights, lights);
+  for (const int32_t agent : replay.followed_agents) {
+    PICTURA_CHECK(agent >= 0 && agent < replay.num_agents, "followed: expected an agent of 0 to {}, got {}",
+                  replay.num_agents - 1, agent);
+  }
+}
+
+void read_images(const Json& header, std::string_view page, Replay* replay_inout) {
   const Json& images = header.at("images");
   if (images.is_null()) return;
-  images.at("frames_per_group").get_to(images_out->frames_per_group);
+  ReplayImages* images_out = &replay_inout->images;
+  const auto per_group = images.at("frames_per_group").get<int64_t>();
+  const auto frame_bytes = static_cast<int64_t>(bytes_of_frame(replay_inout->cameras));
+  const int64_t most = kMaxGroupBytes / std::max<int64_t>(1, frame_bytes);
+  PICTURA_CHECK(per_group >= 1 && per_group <= most,
+                "header: images: frames_per_group: expected 1 to {} frames of {} bytes, got {}", most, frame_bytes,
+                per_group);
+  images_out->frames_per_group = static_cast<int32_t>(per_group);
   const std::string bytes = from_base64(element(page, kImagesBegin, "a replay's images"));
   size_t at = 0;
   for (const Json& group : images.at("group_bytes")) {
@@ -548,10 +582,12 @@ Replay replay_from(std::string_view page) {
   const std::string bytes = inflate(from_base64(element(page, kDataBegin, "a replay's numbers")), total);
   const size_t frames = size(replay.num_frames);
   size_t at = 0;
+  std::set<std::string, std::less<>> names;
   for (const Json& entry : header.at("sections")) {
     const auto name = entry.at("name").get<std::string>();
     const std::string_view section = std::string_view(bytes).substr(at, entry.at("bytes").get<size_t>());
     at += section.size();
+    names.insert(name);
     const NumberReader reader(section);
     if (name == "map") {
       replay.map = map_from(reader);
@@ -575,11 +611,13 @@ Replay replay_from(std::string_view page) {
       replay.tracks[track - kTracks.begin()] = columns_from(reader, frames, size(replay.num_agents), track->order);
     }
   }
-  for (size_t i = 0; i < kNumTracks; ++i) {
-    PICTURA_CHECK(replay.tracks[i].size() == frames * size(replay.num_agents), "header: expected a section '{}'",
-                  kTracks[i].name);
-  }
-  read_images(header, page, &replay.images);
+  const auto require = [&names](std::string_view name) {
+    PICTURA_CHECK(names.contains(name), "header: expected a section '{}'", name);
+  };
+  for (const char* name : {"map", "scenery", "episodes", "conditioning", "lights"}) require(name);
+  for (const TrackInfo& track : kTracks) require(track.name);
+  check_contents(replay);
+  read_images(header, page, &replay);
   return replay;
 }
 

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/support/file.h"
+#include "pictura/common/support/filled_folder.h"
 #include "pictura/replay/encoding.h"
 #include "pictura/replay/file.h"
 #include "pictura/replay/gallery.h"
@@ -65,9 +66,11 @@ Replay any_replay() {
   replay.followed = 1;
   for (int kind = 0; kind < kNumShapeKinds; ++kind) {
     ReplayShape shape{static_cast<ShapeKind>(kind), kind, 10 * kind, {}};
-    for (int i = 0; i < kind; ++i) shape.points_cm.push_back({any_number(&random) / 4, any_number(&random) / 4});
+    const int num_points = shape.kind == ShapeKind::light ? static_cast<int>(kLightPoints) : kind;
+    for (int i = 0; i < num_points; ++i) shape.points_cm.push_back({any_number(&random) / 4, any_number(&random) / 4});
     replay.map.push_back(shape);
   }
+  replay.map.push_back(replay.map.back());  // as many lights as num_lights
   for (int32_t i = 0; i < 2; ++i) {
     ReplayEpisode episode{.index = 4 + i, .first_frame = 20 * i, .num_frames = 20 + 10 * i};
     episode.agents = {{AgentClass::vehicle, 450, 180, 150}, {AgentClass::cyclist, 180, 60, 170}, {}};
@@ -82,6 +85,8 @@ Replay any_replay() {
   for (int i = 0; i < replay.num_frames * replay.num_lights; ++i) {
     replay.lights.push_back(static_cast<uint8_t>(random() % kNumLightStates));
   }
+  replay.followed_agents.assign(50, 1);
+  replay.followed_agents[49] = 2;
   for (size_t i = 0; i < 50 * kDecisionValues; ++i) replay.decisions.push_back(any_number(&random));
   replay.scenery.lines = {{StripKind::crosswalk, {206, 131, 63}, 300, {{-100, 200, 3}, {-1100, 200, 7}, {5, 6, 8}}},
                           {StripKind::road_edge, {200, 36, 35}, 150, {}}};
@@ -256,6 +261,67 @@ TEST(ReplayFormat, ErrorsNameDamagedParts) {
   EXPECT_THAT(message(without("{\"format\"", "{\"format")), HasSubstr("damaged JSON"));
 }
 
+TEST(ReplayFormat, ErrorsNameContentsThatDoNotMatchTheHeader) {
+  const ScratchFolder folder;
+  const auto message = [&](auto&& change) {
+    Replay replay = any_replay();
+    change(replay);
+    write_replay(folder / "a.html", replay);
+    return message_of([&] { read_replay(folder / "a.html"); });
+  };
+  EXPECT_THAT(message([](Replay& r) { r.episodes.pop_back(); }),
+              HasSubstr("a.html: episodes: expected 50 frames, got 20"));
+  EXPECT_THAT(message([](Replay& r) { r.episodes[1].first_frame = 19; }),
+              HasSubstr("episodes: expected an episode of frames 20 to at most 49, got 30 frames from 19 on"));
+  EXPECT_THAT(message([](Replay& r) { r.episodes[1].num_frames = 31; }), HasSubstr("got 31 frames from 20 on"));
+  EXPECT_THAT(message([](Replay& r) { r.map.pop_back(); }), HasSubstr("map: expected 2 lights, got 1"));
+  EXPECT_THAT(message([](Replay& r) { r.map.back().points_cm.pop_back(); }),
+              HasSubstr("map: expected a light of 4 points, got 3"));
+  EXPECT_THAT(message([](Replay& r) { r.followed_agents[3] = 3; }),
+              HasSubstr("followed: expected an agent of 0 to 2, got 3"));
+  EXPECT_THAT(message([](Replay& r) { r.images.frames_per_group = 0; }), HasSubstr("frames_per_group: expected 1 to "));
+  EXPECT_THAT(message([](Replay& r) { r.images.frames_per_group = 1 << 30; }),
+              HasSubstr("frames of 477 bytes, got 1073741824"));
+  write_replay(folder / "a.html", any_replay());
+  std::string page = read_file(folder / "a.html");
+  const std::string lights = "\"name\":\"lights\"";
+  page.replace(page.find(lights), lights.size(), "\"name\":\"events\"");
+  write_file(folder / "a.html", page);
+  EXPECT_THAT(message_of([&] { read_replay(folder / "a.html"); }), HasSubstr("a.html"));
+}
+
+TEST(ReplayFormat, McapFilesHoldTheAgentFollowedInEachFrame) {
+  const ScratchFolder folder;
+  write_mcap(folder / "a.mcap", any_replay());
+  const std::string file = read_file(folder / "a.mcap");
+  const auto count = [&file](const std::string& text) {
+    int found = 0;
+    for (size_t at = file.find(text); at != std::string::npos; at = file.find(text, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("{\"agent\":1,"), 49);
+  EXPECT_EQ(count("{\"agent\":2,"), 1);
+}
+
+// MCAP's specification requires that the records of the summary are grouped by their operation codes.
+TEST(ReplayFormat, TheSummaryOfAnMcapFileIsGrouped) {
+  const ScratchFolder folder;
+  write_mcap(folder / "a.mcap", any_replay());
+  const std::string file = read_file(folder / "a.mcap");
+  const auto number_at = [&file](size_t at) {
+    uint64_t number = 0;
+    for (size_t i = 8; i-- > 0;) number = number << 8 | static_cast<uint8_t>(file[at + i]);
+    return number;
+  };
+  constexpr size_t kFooterBytes = 29, kMagicBytes = 8;
+  const size_t footer = file.size() - kMagicBytes - kFooterBytes;
+  std::string codes;  // one for each group
+  for (size_t at = number_at(footer + 9); at < footer; at += 9 + number_at(at + 1)) {
+    if (codes.empty() || codes.back() != file[at]) codes.push_back(file[at]);
+  }
+  EXPECT_EQ(codes, "\x03\x04\x0b\x08\x0d");  // schemas, channels, statistics, indexes of chunks and of metadata
+}
+
 TEST(ReplayFormat, MutatedHeadersAreReadOrRefused) {
   const ScratchFolder folder;
   const std::string path = folder / "a.html";
@@ -309,6 +375,13 @@ TEST(ReplayFormat, AGalleryListsTheWorstFirst) {
   write_file(folder / "other.html", "<p>no replay</p>");
   EXPECT_THAT(message_of([&] { check_gallery(folder.path()); }), HasSubstr("other.html: expected a page of pictura"));
   EXPECT_THAT(message_of([&] { write_gallery(folder.path()); }), HasSubstr("other.html: expected a page of pictura"));
+}
+
+TEST(ReplayFormat, AGalleryReplacesDamagedPagesOfAnEarlierOne) {
+  const ScratchFolder folder;
+  write_file(FilledFolder(folder.path(), "gallery").file("seed_0.html"), "<p>a page of another version</p>");
+  check_gallery(folder.path());
+  EXPECT_THAT(message_of([&] { write_gallery(folder.path()); }), HasSubstr("seed_0.html: expected a page of pictura"));
 }
 
 TEST(ReplayFormat, AGalleryReplacesNoOtherPageAndNamesMissingHeaderValues) {
