@@ -58,8 +58,9 @@ function show(replay, live) {
       actions.seek(event.frame);
       actions.show(event.agent);
     },
-    // Moves the view to show an agent.
+    // Moves the view to show an agent. An absent agent has no position.
     show(agent) {
+      if (replay.isAbsent(agent, Math.floor(state.time))) return;
       const pose = replay.pose(agent, state.time), [px, py] = world.pixelOf(pose.x_m, pose.y_m), edge = 40 * world.ratio;
       const isIn = px > edge && py > edge && px < world.canvas.width - edge && py < world.canvas.height - edge;
       if (!isIn) { state.x = pose.x_m; state.y = pose.y_m; }
@@ -117,7 +118,7 @@ function show(replay, live) {
     if (!live && SPEEDS.includes(number("speed"))) state.speed = number("speed");
     if (number("zoom") > 0) state.zoom = Math.min(60, Math.max(0.05, number("zoom")));
     if (number("x") !== null && number("y") !== null) { state.x = number("x"); state.y = number("y"); }
-    else if (number("zoom") > 0) ({ x_m: state.x, y_m: state.y } = replay.pose(state.agent, state.time));
+    else if (number("zoom") > 0 && !replay.isAbsent(state.agent, Math.floor(state.time))) ({ x_m: state.x, y_m: state.y } = replay.pose(state.agent, state.time));
     state.follow = values.get("follow") === "1";
     if (values.get("goals") === "1") state.goals = true;
     state.camera = header.cameras.some(c => c.name === values.get("camera")) ? values.get("camera") : "";

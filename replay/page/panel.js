@@ -159,8 +159,8 @@ class Panel {
     };
     set("speed", replay.get("speed_mps", agent, frame) * 3.6, 1, "km/h");
     set("steer", replay.get("steer_deg", agent, frame), 1, "\u00b0");
-    // A halted agent is stopped within a step, which is not braking.
-    set("acceleration", status === "halted" ? NaN : frame > before ? (replay.get("speed_mps", agent, frame) - replay.get("speed_mps", agent, before)) / replay.dt_s : 0, 1, "m/s\u00b2");
+    // A halted agent is stopped within a step, which is not braking. An absent agent has no speed.
+    set("acceleration", status === "halted" || status === "absent" ? NaN : frame > before && !replay.isAbsent(agent, before) ? (replay.get("speed_mps", agent, frame) - replay.get("speed_mps", agent, before)) / replay.dt_s : 0, 1, "m/s\u00b2");
     set("value", decision ? decision.value : NaN, 2, "");
     // An agent that follows a recording has no actions and no rewards of its own.
     const isRecorded = status === "recorded";
@@ -174,8 +174,8 @@ class Panel {
   drawActions(frame, agent) {
     const { replay } = this, decision = replay.decision(agent, frame), chosen = replay.action(agent, frame);
     byId("action-note").textContent = decision ? "probability of each action; frame: the chosen action"
-      : !replay.decisions || replay.followed < 0 ? "frame: the chosen action"
-      : replay.isFollowed(agent, frame) ? "its policy does not act now" : `the policy's probabilities are those of agent ${replay.followed}`;
+      : !replay.decisions || replay.followedAt(frame) < 0 ? "frame: the chosen action"
+      : replay.isFollowed(agent, frame) ? "its policy does not act now" : `the policy's probabilities are those of agent ${replay.followedAt(frame)}`;
     this.cells.forEach((cell, i) => {
       const p = decision ? decision.probabilities[i] : 0;
       cell.classList.toggle("chosen", i === chosen);
@@ -263,10 +263,10 @@ class Panel {
   drawCurves(theme, ratio) {
     const { replay, state } = this;
     for (const curve of this.curves) {
-      curve.box.hidden = Boolean(curve.decided) && !(replay.decisions && replay.isFollowed(state.agent, Math.floor(state.time)));
+      const values = Float32Array.from({ length: replay.frames }, (_, frame) => replay.isAbsent(state.agent, frame) ? NaN : curve.of(state.agent, frame));
+      curve.box.hidden = Boolean(curve.decided) && values.every(Number.isNaN);
       const width = Math.max(1, Math.round(curve.canvas.clientWidth * ratio)), height = Math.round(52 * ratio);
       if (curve.box.hidden) continue;
-      const values = Float32Array.from({ length: replay.frames }, (_, frame) => replay.isAbsent(state.agent, frame) ? NaN : curve.of(state.agent, frame));
       let low = 0, high = 0;
       for (const value of values) { if (value < low) low = value; if (value > high) high = value; }
       if (high - low < 1e-6) high = low + 1;

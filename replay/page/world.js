@@ -265,7 +265,9 @@ class WorldView {
     context.globalAlpha = 1;
   }
   drawTrail(time, frame, theme) {
-    const { context, replay, state } = this, first = Math.max(replay.episode(frame).first, frame - 60);
+    const { context, replay, state } = this, oldest = Math.max(replay.episode(frame).first, frame - 60);
+    let first = frame;
+    while (first > oldest && !replay.isAbsent(state.agent, first - 1)) --first;
     context.lineWidth = 2.5 * this.ratio;
     context.lineCap = "butt";  // overlapping ends would show
     context.strokeStyle = theme["--accent"];

@@ -216,6 +216,33 @@ class Chromium(PageCase):
         fact = "[...document.querySelectorAll('#facts *')].find(e => e.textContent.startsWith('Acceleration')).textContent"
         self.assertIn("\u2013", self.browser.run(fact))
 
+    def test_absent_agents_have_no_position(self):
+        self.open(fragment="#step=20&agent=4&zoom=3&x=5&y=7")
+        # Agent 4 enters at step 30.
+        self.browser.run(
+            "(() => { const { stride, tracks } = pictura.replay;"
+            " for (const [name, value] of [['status', 3], ['x_m', 0], ['y_m', 0], ['speed_mps', 0]]) tracks[name].fill(value, 4 * stride, 4 * stride + 30); })()"
+        )
+        center = lambda: [self.state()["x"], self.state()["y"]]
+        self.browser.run("pictura.actions.show(4)")
+        self.assertEqual(center(), [5, 7])
+        self.browser.run("location.hash = '#step=21&agent=4&zoom=6'")
+        self.browser.wait_for("pictura.state.time === 21")
+        self.assertEqual(center(), [5, 7])
+        # Neither a trail nor an acceleration begins at the origin.
+        reached = self.browser.run(
+            "(() => { const { prototype } = CanvasRenderingContext2D, { lineTo } = prototype, { width, height } = document.getElementById('world'), points = [];"
+            " prototype.lineTo = function (x, y) { points.push([x, y]); lineTo.call(this, x, y); };"
+            " pictura.actions.seek(45); pictura.drawn(); prototype.lineTo = lineTo;"
+            " const scale = pictura.state.zoom * devicePixelRatio, origin = [width / 2 - 5 * scale, height / 2 + 7 * scale];"
+            " return points.some(([x, y]) => Math.hypot(x - origin[0], y - origin[1]) < 1e-6); })()"
+        )
+        self.assertFalse(reached)
+        self.browser.run("pictura.actions.seek(30); pictura.drawn() && null")
+        fact = "[...document.querySelectorAll('#facts *')].find(e => e.textContent.startsWith('Acceleration')).textContent"
+        self.assertIn("Acceleration0.0", self.browser.run(fact))
+        self.assertEqual(self.browser.errors, [])
+
     def test_clicks_choose_agents_and_events(self):
         self.open()
         self.browser.run("pictura.actions.seek(10)")
@@ -325,6 +352,23 @@ class Chromium(PageCase):
         self.browser.wait_for("window.pictura && pictura.state.time === 43 && pictura.state.follow")
         self.browser.run("location.hash = '#step=5&agent=2'")
         self.browser.wait_for("pictura.state.time === 5 && pictura.state.agent === 2")
+
+    def test_the_followed_slot_shows_each_of_its_agents(self):
+        lane = '<lane id="%d" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
+        street = self.folder / "street.xodr"
+        street.write_text(
+            '<OpenDRIVE><header revMajor="1" revMinor="4"/><road length="100" id="1" junction="-1"><type s="0" type="town"><speed max="50" unit="km/h"/></type>'
+            '<planView><geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry></planView><lanes><laneSection s="0">'
+            f'<left>{lane % 1}</left><center><lane id="0" type="none"/></center><right>{lane % -1}</right></laneSection></lanes></road></OpenDRIVE>'
+        )
+        path = self.folder / "street.html"
+        self.pictura("replay", street, "--agents", 4, "--steps", 250, "--policy", "lane", "--pedestrians", 0, "--cyclists", 0, "--parked", 0,
+                     "--follow", 0, "--cameras", "--out", path)  # fmt: skip
+        self.open(path)
+        followed = self.browser.run("Array.from({ length: 251 }, (_, frame) => pictura.replay.followedAt(frame))")
+        self.assertEqual(followed[0], 0)
+        self.assertGreaterEqual(followed[250], 4)
+        self.assertTrue(self.browser.run("pictura.replay.hasImages(pictura.replay.followedAt(250), 250) && !pictura.replay.hasImages(0, 250)"))
 
     def test_images_of_the_followed_agent_equal_those_of_the_file(self):
         self.open(fragment="#step=50&agent=4")
