@@ -27,9 +27,10 @@ Layout::Layout(const TownOptions& options) : options_(options) {
   remove_streets();
   choose_street_features();
   join_streets();
-  choose_crossing_features();
   set_headings();
   curve_streets();
+  remove_large_roundabouts();
+  choose_crossing_features();
   choose_slip_lanes();
   build_curves();
   set_heights();

@@ -1,6 +1,7 @@
 // Layout of a town: crossings on a jittered grid, and streets between them. Makes all random decisions.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "pictura/common/rng.h"
@@ -128,7 +129,7 @@ class Layout {
     kHills = 200,
   };
 
-  // Stages, in the order of execution.
+  // Stages of each file, in the order of execution.
   void place_nodes();
   void plan_streets();
   void choose_avenues();
@@ -144,6 +145,7 @@ class Layout {
   void set_headings();
   void spread_arms(Node* node);
   void curve_streets();
+  void remove_large_roundabouts();
   void choose_slip_lanes();
   void build_curves();
   // layout_heights.cpp
@@ -170,6 +172,9 @@ class Layout {
   bool is_connected() const;
   bool is_removable(int street) const;
   double mouth_distance_m(const Node& node, int arm) const;
+  double mouth_distance_m(const Street& street, int node) const;
+  std::pair<Pose, Pose> ends_of(const Street& street) const;
+  bool fits_between_mouths(const Street& street) const;
   Curve curve_of(const Street& street) const;
   void set_arm_heading(int street, bool at_start, double heading);
   bool has_close_arms(const Node& node) const;

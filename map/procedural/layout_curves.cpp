@@ -1,5 +1,8 @@
 // Curves of streets: the headings of arms, the extent of junctions, and the curves between junctions. The mouth of a
 // street is its end at a junction.
+#include <algorithm>
+
+#include "pictura/common/error.h"
 #include "pictura/map/procedural/layout.h"
 #include "pictura/map/procedural/movements.h"
 #include "pictura/map/procedural/roundabout_shape.h"
@@ -15,6 +18,8 @@ constexpr double kMinGap_rad = degrees(72), kMinOppositeGap_rad = degrees(150), 
 // Angle above which neighbouring arms meet without a corner.
 constexpr double kFlatGap_rad = degrees(140);
 constexpr double kMinMouth_m = 9, kMinBendMouth_m = 10;
+// Minimum distance between the mouths of a street. Greater distances would change the towns of some seeds.
+constexpr double kMinStreet_m = 3;
 constexpr double kOverpassMargin_m = 2;
 // Radii of the inner edge of a bend.
 constexpr double kBendRadius_m = 10, kMotorwayBendRadius_m = 90;
@@ -113,8 +118,23 @@ void Layout::curve_streets() {
       set_arm_heading(s, true, straight + angle);
       set_arm_heading(s, false, straight + arrive_sign * angle + kPi_rad);
       if (angle == 0) break;
-      if (has_close_arms(from) || has_close_arms(to)) continue;
+      if (has_close_arms(from) || has_close_arms(to) || !fits_between_mouths(streets_[s])) continue;
       if (max_curvature(curve_of(streets_[s])) <= 1 / kMinStreetRadius_m) break;
+    }
+  }
+}
+
+/// Changes roundabouts into crossings, which are smaller, where a street is shorter than the mouths at its ends.
+void Layout::remove_large_roundabouts() {
+  for (const Street& street : streets_) {
+    const auto mouth_of_roundabout_m = [&](int node) {
+      return nodes_[node].kind == NodeKind::roundabout ? mouth_distance_m(street, node) : 0;
+    };
+    while (!fits_between_mouths(street)) {
+      const int larger =
+          mouth_of_roundabout_m(street.to) > mouth_of_roundabout_m(street.from) ? street.to : street.from;
+      if (nodes_[larger].kind != NodeKind::roundabout) break;
+      nodes_[larger].kind = NodeKind::crossing;
     }
   }
 }
@@ -164,16 +184,29 @@ double Layout::mouth_distance_m(const Node& node, int index) const {
   return mouth;
 }
 
+double Layout::mouth_distance_m(const Street& street, int node) const {
+  int index = 0;
+  while (&streets_[nodes_[node].arms[index].street] != &street) ++index;
+  return mouth_distance_m(nodes_[node], index);
+}
+
+/// Returns the poses of the mouths at both ends of a street, both in the street's direction.
+std::pair<Pose, Pose> Layout::ends_of(const Street& street) const {
+  const Pose from{nodes_[street.from].position_m, street.leave}, to{nodes_[street.to].position_m, street.arrive};
+  return {offset_right(moved_forward(from, mouth_distance_m(street, street.from)), street.start_offset_m),
+          offset_right(moved_forward(to, -mouth_distance_m(street, street.to)), street.end_offset_m)};
+}
+
+/// Whether the way between the mouths of a street is at least kMinStreet_m long in the direction of both mouths.
+bool Layout::fits_between_mouths(const Street& street) const {
+  const auto [from, to] = ends_of(street);
+  const Eigen::Vector2d way = to.position_m - from.position_m;
+  return way.dot(direction_of(from.heading)) >= kMinStreet_m && way.dot(direction_of(to.heading)) >= kMinStreet_m;
+}
+
 Curve Layout::curve_of(const Street& street) const {
-  const auto mouth = [&](int n) {
-    const Node& node = nodes_[n];
-    int index = 0;
-    while (&streets_[node.arms[index].street] != &street) ++index;
-    return mouth_distance_m(node, index);
-  };
-  const Node &from = nodes_[street.from], &to = nodes_[street.to];
-  return biarc(offset_right(moved_forward({from.position_m, street.leave}, mouth(street.from)), street.start_offset_m),
-               offset_right(moved_forward({to.position_m, street.arrive}, -mouth(street.to)), street.end_offset_m));
+  const auto [from, to] = ends_of(street);
+  return biarc(from, to);
 }
 
 /// Chooses slip lanes among the right turns at lights where both streets are long enough for the larger corner.
@@ -206,6 +239,8 @@ void Layout::choose_slip_lanes() {
     Street &street = streets_[in.street], &exit = streets_[out.street];
     bool& slip = in.at_start ? street.slip_at_start : street.slip_at_end;
     slip = true;
+    slip = fits_between_mouths(street) && fits_between_mouths(exit);
+    if (!slip) continue;
     Curve in_curve = curve_of(street), out_curve = curve_of(exit);
     const int ends = (street.slip_at_start ? 1 : 0) + (street.slip_at_end ? 1 : 0);
     const int exit_ends = (exit.slip_at_start ? 1 : 0) + (exit.slip_at_end ? 1 : 0);
@@ -222,6 +257,13 @@ void Layout::build_curves() {
     for (int i = 0; i < node.degree(); ++i) node.arms[i].mouth_m = mouth_distance_m(node, i);
   }
   for (Street& street : streets_) {
+    if (!fits_between_mouths(street)) {
+      const Eigen::Vector2d &from = nodes_[street.from].position_m, &to = nodes_[street.to].position_m;
+      fail_usage(
+          "procedural town: expected at least {} m of street between the crossings at ({:.1f}, {:.1f}) and ({:.1f}, "
+          "{:.1f}), got less; increase block-m, or decrease max-lanes",
+          kMinStreet_m, from.x(), from.y(), to.x(), to.y());
+    }
     street.curve = curve_of(street);
     street.length_m = assign_stations(&street.curve);
   }

@@ -73,7 +73,8 @@ inline opendrive::GeometryPiece arc_to(const Pose& from, const Eigen::Vector2d& 
   return piece_of(from, chord * half_turn / std::sin(half_turn), 2 * std::sin(half_turn) / chord);
 }
 
-/// Returns a biarc with equal tangent lengths at both ends, or a single arc if the two arcs have equal curvature.
+/// Returns a biarc with equal tangent lengths at both ends, or a single arc if the two arcs have equal curvature. The
+/// way from `from` to `to` must point forward: backward, the curve would be nearly a circle, or not finite.
 inline Curve biarc(const Pose& from, const Pose& to) {
   const Eigen::Vector2d leaving = direction_of(from.heading), arriving = direction_of(to.heading);
   const Eigen::Vector2d chord = to.position_m - from.position_m;

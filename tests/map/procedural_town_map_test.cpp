@@ -352,6 +352,12 @@ TEST(ProceduralTownMap, TownsWithRandomOptionsAreValid) {
   }
 }
 
+TEST(ProceduralTownMap, TownsWithMixedOptionsAreValid) {
+  for (uint64_t seed = 0; seed < num_seeds() / 4; ++seed) {
+    if (!expect_valid(test::mixed_options(seed, 2, 2, seed % 2 == 0 ? "city" : "procedural"))) return;
+  }
+}
+
 TEST(ProceduralTownMap, TownsWithOneFeatureAtItsMinimumOrMaximumAreValid) {
   uint64_t seed = 1000;
   for (const TownFeature& feature : town_features()) {
@@ -385,7 +391,7 @@ INSTANTIATE_TEST_SUITE_P(Family, ProceduralTownMapOf, testing::Values("procedura
 
 TEST_P(ProceduralTownMapOf, OverpassesHaveClearanceBelow) {
   TownOptions options = test::options_of(4, 3, 3, GetParam());
-  options.hills_m = 0;
+  options.hills_m = 50;
   const RoadMap map = parse_opendrive(procedural_town(options), "town");
   float min_clearance_m = 1e9f;
   int crossings = 0;
@@ -399,7 +405,12 @@ TEST_P(ProceduralTownMapOf, OverpassesHaveClearanceBelow) {
                               q[j].position_m.xy())) {
             continue;
           }
-          min_clearance_m = min_of(min_clearance_m, std::abs(p[i].position_m.z - q[j].position_m.z));
+          // Heights where the pieces cross.
+          const Vec3 p_way = p[i].position_m - p[i - 1].position_m, q_way = q[j].position_m - q[j - 1].position_m;
+          const Vec3 apart = q[j - 1].position_m - p[i - 1].position_m;
+          const float turn = cross(p_way.xy(), q_way.xy());
+          const float u = cross(apart.xy(), q_way.xy()) / turn, v = cross(apart.xy(), p_way.xy()) / turn;
+          min_clearance_m = min_of(min_clearance_m, std::abs(apart.z + v * q_way.z - u * p_way.z));
           ++crossings;
         }
       }

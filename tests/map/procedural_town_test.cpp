@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "pictura/common/error.h"
+#include "pictura/map/procedural/layout.h"
 #include "pictura/tests/map/opendrive_text.h"
 #include "pictura/tests/map/town_options.h"
 #include "pictura/tests/support/error_message.h"
@@ -66,6 +67,29 @@ std::string describe(const TownOptions& options) {
 TEST(ProceduralTownText, FollowsTheRulesOfOpenDrive) {
   for (const TownOptions& options : many_towns()) {
     ASSERT_THAT(violated_rules(OpenDriveText(procedural_town(options))), IsEmpty()) << describe(options);
+  }
+}
+
+TEST(ProceduralTownLayout, StreetsLeadForwardBetweenTheirCrossings) {
+  std::vector<TownOptions> all;
+  for (const char* family : {"procedural", "city"}) {
+    for (const auto& [x, y] : {std::pair{1, 1}, {1, 4}, {4, 1}, {2, 3}, {4, 3}}) {
+      for (uint64_t seed = 0; seed < 40; ++seed) all.push_back(test::mixed_options(seed, x, y, family));
+    }
+    for (uint64_t seed = 0; seed < 20; ++seed) {
+      all.push_back(test::options_of(seed, 4, 3, family));
+      all.back().block_m = 80;
+      all.back().roundabouts = 1;
+      all.back().roundabout_lanes = 2;
+    }
+  }
+  for (const TownOptions& options : all) {
+    for (const town::Street& street : town::Layout(options).streets()) {
+      double turn = 0;
+      for (const opendrive::GeometryPiece& piece : street.curve) turn += std::abs(piece.length * piece.start_curvature);
+      ASSERT_GE(street.length_m, 3) << describe(options);
+      ASSERT_LT(turn, M_PI) << describe(options);
+    }
   }
 }
 
