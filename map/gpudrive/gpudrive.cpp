@@ -295,11 +295,15 @@ void read_lights(const Json& lights, const Json& roads, LoggedScene* scene) {
 }
 
 /// Converts the headings of older files from degrees to radians. Headings are degrees if, read as degrees, the headings
-/// of moving objects fit their motion better. If they fit equally well, headings are degrees if any exceeds a whole
-/// turn in radians.
+/// of moving objects fit their motion better, and either do not fit it as radians, or one exceeds a whole turn in
+/// radians. If they fit equally well, headings are degrees if any exceeds a whole turn in radians.
 void convert_degrees(LoggedScene* scene) {
   constexpr double kMoving_mps = 0.5, kLargest_rad = 6.3, kRadians = std::numbers::pi / 180;
+  // Mean cosine of radians that fit. Headings near 0, of traffic along +x, fit as radians and slightly better as
+  // degrees.
+  constexpr double kGoodFit = 0.5;
   double fit = 0, fit_of_degrees = 0;  // sums of the cosines between heading and motion
+  int moving = 0;
   bool is_large = false;
   for (const LoggedTrack& track : scene->tracks) {
     for (const LoggedState& state : track.states) {
@@ -307,11 +311,14 @@ void convert_degrees(LoggedScene* scene) {
       is_large = is_large || std::abs(state.heading_rad) > kLargest_rad;
       if (!(hypot_of(state.velocity_x_mps, state.velocity_y_mps) > kMoving_mps)) continue;
       const double motion = std::atan2(state.velocity_y_mps, state.velocity_x_mps);
+      ++moving;
       fit += std::cos(state.heading_rad - motion);
       fit_of_degrees += std::cos(kRadians * state.heading_rad - motion);
     }
   }
-  if (!(fit_of_degrees > fit || (is_large && fit_of_degrees == fit))) return;
+  const bool are_degrees =
+      is_large ? fit_of_degrees >= fit : fit_of_degrees > fit && fit < kGoodFit * static_cast<double>(moving);
+  if (!are_degrees) return;
   for (std::size_t i = 0; i < scene->tracks.size(); ++i) {
     bool is_present = false;
     for (LoggedState& state : scene->tracks[i].states) {

@@ -195,6 +195,20 @@ TEST(GpuDrive, HeadingsAreDegreesOnlyIfTheyFit) {
   EXPECT_NEAR(read_json(text).states[91].heading_rad, 9.42477796 * M_PI / 180, 1e-6);
 }
 
+// Such headings fit slightly better as degrees.
+TEST(GpuDrive, HeadingsOfTrafficAlongXAreRadians) {
+  std::string text = OldScene{}.text();
+  for (const auto& [from, to] : {std::pair{R"("heading":[0.0)", R"("heading":[0.01)"}, {"3.14159265", "0.01"}}) {
+    for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; ++at) {
+      text.replace(at, std::string_view(from).size(), to);
+    }
+  }
+  for (std::size_t at = 0; (at = text.find("-7", at)) != std::string::npos;) text.replace(at, 2, "7");
+  const Scenario scene = read_json(text);
+  EXPECT_FLOAT_EQ(scene.states[0].heading_rad, 0.01f);
+  EXPECT_FLOAT_EQ(scene.states[91].heading_rad, 0.01f);
+}
+
 TEST(GpuDrive, LightsAreReadFromObjectsAndLists) {
   OldScene old{.has_z = true, .has_ids = true, .height = R"(,"height":1.6)", .more = R"("scenario_id":4711,)"};
   old.first_step = 30;
