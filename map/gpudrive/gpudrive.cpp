@@ -245,7 +245,7 @@ void read_light(const std::string& lane, const Json& light, const std::map<std::
         const int64_t time = times[i].is_number_integer() ? times[i].get<int64_t>() : -1;
         if (time < 0 || time >= static_cast<int64_t>(steps)) {
           fail_field("", "expected a step in [0, {}), got {}", steps,
-                     times[i].is_number_integer() ? fmt::format("{}", time) : times[i].type_name());
+                     times[i].is_number_integer() ? times[i].dump() : times[i].type_name());
         }
         step = static_cast<std::size_t>(time);
       });
@@ -279,9 +279,10 @@ void read_lights(const Json& lights, const Json& roads, LoggedScene* scene) {
                lights.size());
   }
   std::map<std::string, int64_t> lane_ids;
-  for (std::size_t i = 0; i < roads.size(); ++i) {
-    if (!roads[i].contains("id") || !roads[i]["id"].is_number_integer()) continue;
-    lane_ids.emplace(std::to_string(roads[i]["id"].get<int64_t>()), static_cast<int64_t>(i));
+  for (const LoggedLane& lane : scene->lanes) {
+    const Json& road = roads[static_cast<std::size_t>(lane.id)];
+    if (!road.contains("id") || !road["id"].is_number_integer()) continue;
+    lane_ids.emplace(road["id"].dump(), lane.id);
   }
   if (lights.is_array()) {
     for (std::size_t i = 0; i < lights.size(); ++i) {

@@ -238,6 +238,17 @@ TEST(GpuDrive, LightsAreReadFromObjectsAndLists) {
   }
 }
 
+TEST(GpuDrive, LightsBelongToLanesThoughOtherRoadsHaveTheirId) {
+  OldScene old{.has_z = true, .has_ids = true, .height = R"(,"height":1.6)"};
+  old.lights = R"({"11":{"state":["stop"]}})";
+  std::string text = old.text();
+  const std::string road = old.road(11, "road_line", 11, -20, 120, 1.8) + ",";
+  text.insert(text.find(R"("roads":[)") + 9, road);
+  const Scenario scene = read_json(text);
+  EXPECT_EQ(scene.lights.size(), 1u);
+  EXPECT_THAT(scene.notes, ::testing::IsEmpty());
+}
+
 TEST(GpuDrive, AnObjectFlagSelectsTheSelfDrivingCar) {
   const OldScene old{.more = R"("metadata":{"sdc_track_index":0},)"};
   EXPECT_EQ(read_json(old.text()).sdc_track, 0);
