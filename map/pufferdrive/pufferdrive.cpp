@@ -175,7 +175,11 @@ void read_old_road(Cursor* cursor, bool has_ids, int32_t index, LoggedScene* sce
     case edge:
     case crosswalk: add_feature(scene, index, std::move(points), type == edge); break;
     case stop_sign:
-      if (!points.empty()) scene->stop_signs.push_back({.id = index, .position_m = points[0]});
+      if (points.empty()) {
+        scene->note("stop signs without a point left out", fmt::format("roads[{}]", index));
+      } else {
+        scene->stop_signs.push_back({.id = index, .position_m = points[0]});
+      }
       break;
     default:
       scene->note("speed bumps and driveways, which maps do not have, left out", fmt::format("roads[{}]", index));

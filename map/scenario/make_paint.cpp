@@ -113,7 +113,11 @@ void make_edges(Conversion* conversion) {
     LoggedPoints part;
     const auto finish = [&] {
       std::vector<CurvePoint> line = resampled(conversion, part, {}, place);
-      if (!line.empty()) lines.push_back(std::move(line));
+      if (line.empty()) {
+        scene.note("edges of fewer than two points left out", place);
+      } else {
+        lines.push_back(std::move(line));
+      }
       part.clear();
     };
     for (const Eigen::Vector3d& p : edge.points) {
@@ -148,9 +152,12 @@ void make_edges(Conversion* conversion) {
 void make_markings(Conversion* conversion) {
   LoggedScene& scene = conversion->scene;
   for (const LoggedLine& logged : scene.lines) {
-    const std::vector<CurvePoint> line =
-        resampled(conversion, logged.points, {}, fmt::format("road line {}", logged.id));
-    if (line.empty()) continue;
+    const std::string place = fmt::format("road line {}", logged.id);
+    const std::vector<CurvePoint> line = resampled(conversion, logged.points, {}, place);
+    if (line.empty()) {
+      scene.note("road lines of fewer than two points left out", place);
+      continue;
+    }
     const auto left = [&] { return moved_left(line, kStripeOffset_m); };
     const auto right = [&] { return moved_left(line, -kStripeOffset_m); };
     const auto solid = [&](const std::vector<CurvePoint>& points, MarkColor color) {

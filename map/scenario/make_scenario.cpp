@@ -78,7 +78,8 @@ std::vector<CurvePoint> resampled(Conversion* conversion, const LoggedPoints& po
     line = std::move(thinned);
   }
   // Removes duplicates. After points have been omitted, points at both ends of the omitted part may be duplicates.
-  if (scene.is_authored) line = cut_into_pieces(conversion, line, what);
+  line = cut_into_pieces(conversion, line, what);
+  if (line.size() < 2) return {};
   return line;
 }
 
@@ -270,11 +271,13 @@ RecordedLight recorded_light(const FoundLight& found, const Conversion& conversi
 }  // namespace
 
 void make_lights(Conversion* conversion) {
-  const LoggedScene& scene = conversion->scene;
+  LoggedScene& scene = conversion->scene;
   Scenario& out = *conversion->out;
   std::vector<FoundLight> found;
   conversion->count_work(scene.lights.size() * static_cast<std::size_t>(scene.num_steps));
   for (const LoggedLight& light : scene.lights) {
+    if (light.lanes.empty())
+      scene.note("lights without lanes left out", fmt::format("light {}", &light - scene.lights.data()));
     std::vector<int32_t> lanes = held_lanes(light, conversion);
     if (lanes.empty()) continue;
     FoundLight one = find_light(out.map, light, std::move(lanes));

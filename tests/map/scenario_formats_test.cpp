@@ -1,6 +1,7 @@
 // GPUDrive's JSON and PufferDrive's binary layouts. The tests write a scene to a file; reading the file gives the same
 // scene, as far as the format allows. Faults are reported with file and field.
 #include <cmath>
+#include <cstring>
 #include <functional>
 
 #include <fmt/format.h>
@@ -290,6 +291,23 @@ TEST(PufferDrive, EveryLayoutIsReadAsWritten) {
     EXPECT_EQ(successors_of(read.map), successors_of(expected.map));
     EXPECT_EQ(read.lights.size(), layout == PufferLayout::v3c ? 4u : 0u) << "each with a line of its own";
   }
+}
+
+TEST(PufferDrive, StopSignsWithoutPointsAreLeftOutWithANote) {
+  LoggedScene fixture = test::make_fixture({.num_steps = 3, .num_vehicles = 1});
+  const auto read_without = [&](int points) {
+    std::string bytes = test::write_pufferdrive(fixture, PufferLayout::v1);
+    // Type, then number of points, of the only stop sign.
+    const int32_t sign[]{7, 1}, changed[]{7, points};
+    const std::size_t at = bytes.rfind({reinterpret_cast<const char*>(sign), sizeof sign});
+    std::memcpy(bytes.data() + at, changed, sizeof changed);
+    if (points == 0) bytes.erase(at + sizeof sign, 3 * sizeof(float));
+    return read_binary(bytes);
+  };
+  EXPECT_EQ(read_without(1).map.signs.size(), 1u);
+  const Scenario scene = read_without(0);
+  EXPECT_EQ(scene.map.signs.size(), 0u);
+  EXPECT_THAT(notes_of(scene), ::testing::ElementsAre("1 stop signs without a point left out"));
 }
 
 TEST(PufferDrive, NewestLayoutHasLimitsLightsAndTails) {

@@ -113,6 +113,24 @@ TEST(LaneRules, FaultyLanesAndLinksAreRepairedAndCounted) {
   EXPECT_EQ(scenario.map.lanes[1].successors.size(), 0);
 }
 
+// Thinning such a line leaves two equal points.
+TEST(LaneRules, LinesThatReturnWithinTheToleranceAreLeftOutWithANote) {
+  LoggedScene scene = small_scene();
+  const LoggedPoints there_and_back{{3, 3, 0}, {3.015, 3, 0}, {3, 3, 0}};
+  scene.lanes.push_back({.id = 2, .type = LoggedLaneType::surface, .points = there_and_back});
+  scene.lines.push_back({.id = 3, .points = there_and_back});
+  scene.lines.push_back({.id = 4, .points = {{0, 0, 0}}});
+  scene.edges.push_back({.id = 5, .points = there_and_back});
+  scene.edges.push_back({.id = 6});
+  const Scenario scenario = make_scenario(scene);
+  EXPECT_EQ(scenario.map.lanes.size(), 1u);
+  EXPECT_EQ(scenario.map.markings.size(), 0u);
+  EXPECT_EQ(scenario.map.road_edges.size(), 0u);
+  EXPECT_EQ(count_of(scenario, "lanes of fewer than two points"), 1);
+  EXPECT_EQ(count_of(scenario, "road lines of fewer than two points"), 2);
+  EXPECT_EQ(count_of(scenario, "edges of fewer than two points"), 2);
+}
+
 TEST(LaneRules, TypesOfUndefinedLanesFollowTheirLinks) {
   LoggedScene scene = small_scene();
   scene.lanes.push_back(lane_at(2, 0, 20, 40));
