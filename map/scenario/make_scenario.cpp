@@ -16,6 +16,7 @@ namespace {
 
 // Maximum differences between stop points, and between headings at the starts of lanes, of lanes that share one light.
 constexpr double kSameStopPoint_m = 0.5, kSameHeading_rad = 0.5;
+constexpr float kMinStopLine_m = 1;        // across lanes that begin with almost no width
 constexpr double kAuthoredPiece_m = 9.99;  // used instead of kMaxPiece_m for scenes that a program wrote
 
 float wrapped(double heading_rad) { return static_cast<float>(std::remainder(heading_rad, 2 * std::numbers::pi)); }
@@ -224,7 +225,7 @@ FoundLight find_light(const RoadMap& map, const LoggedLight& light, std::vector<
   const auto add_heading = [&direction](double heading) {
     direction += Eigen::Vector2d(std::cos(heading), std::sin(heading));
   };
-  LanePoint widest{};
+  LanePoint widest = map.points_of(map.lanes[lanes[0]])[0];
   for (const int32_t index : lanes) {
     const Lane& lane = map.lanes[index];
     const LanePoint start = map.points_of(lane)[0];
@@ -259,7 +260,7 @@ RecordedLight recorded_light(const FoundLight& found, const Conversion& conversi
     const double to_right = std::sin(found.heading_rad) * way.x - std::cos(found.heading_rad) * way.y;
     if (to_right < 0) std::swap(recorded.stop_a_m, recorded.stop_b_m);
   } else {
-    const float half = 0.5f * found.start.width_m;
+    const float half = 0.5f * max_of(found.start.width_m, kMinStopLine_m);
     const Vec3 left{-static_cast<float>(std::sin(found.heading_rad)) * half,
                     static_cast<float>(std::cos(found.heading_rad)) * half, 0};
     recorded.stop_a_m = found.start.position_m + left;

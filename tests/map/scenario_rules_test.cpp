@@ -240,6 +240,20 @@ TEST(LightRules, LanesOfOneStopPointWithEqualStatesAreOneLight) {
   EXPECT_GT(way.y, 0) << "traffic comes westwards, so the left end is the southern one";
 }
 
+TEST(LightRules, LightsStopLanesThatBeginWithoutWidthAtTheirStart) {
+  LoggedScene scene = small_scene();
+  scene.lanes[0].widths_m.assign(scene.lanes[0].points.size(), 3.5);
+  scene.lanes[0].widths_m[0] = 0;
+  scene.lights = {{.lanes = {1}, .states = {RecordedLightState::stop, RecordedLightState::go}},
+                  {.states = {RecordedLightState::stop, RecordedLightState::go}}};
+  const Scenario scenario = make_scenario(scene);
+  ASSERT_EQ(scenario.lights.size(), 1u);
+  EXPECT_EQ(scenario.lights[0].stop_a_m.x, -10);
+  EXPECT_EQ(scenario.lights[0].stop_a_m.y, 0.5f);
+  EXPECT_EQ(scenario.lights[0].stop_b_m.y, -0.5f);
+  EXPECT_EQ(count_of(scenario, "lights without lanes"), 1);
+}
+
 TEST(TrackRules, SizesAreThoseOfTheCurrentStep) {
   LoggedScene scene = small_scene();
   scene.current_step = 1;
