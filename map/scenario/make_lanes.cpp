@@ -179,10 +179,7 @@ LaneLinks given_links(Conversion* conversion) {
       scene.note("links to lanes that the map does not have left out", place_of(stated_by));
       return;
     }
-    if (from->second == to->second) {
-      scene.note("links of a lane to itself left out", place_of(stated_by));
-      return;
-    }
+    if (from_id == to_id) return;
     const int32_t a = from->second, b = to->second;
     const float gap_m = length(end_of(map, a).position_m - start_of(map, b).position_m);
     const float other_m = length(end_of(map, b).position_m - start_of(map, a).position_m);
@@ -200,6 +197,13 @@ LaneLinks given_links(Conversion* conversion) {
     conversion->count_work(20 * (lane.entries.size() + lane.exits.size()));
     for (const int64_t other : lane.entries) add(other, lane.id, lane);
     for (const int64_t other : lane.exits) add(lane.id, other, lane);
+    // The link of a lane to itself is both an entry and an exit.
+    const auto has_itself = [&](const std::vector<int64_t>& ids) {
+      return std::find(ids.begin(), ids.end(), lane.id) != ids.end();
+    };
+    if (has_itself(lane.entries) || has_itself(lane.exits)) {
+      scene.note("links of a lane to itself left out", place_of(lane));
+    }
   }
   return links;
 }

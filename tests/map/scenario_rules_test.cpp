@@ -142,6 +142,12 @@ TEST(LaneRules, TypesOfUndefinedLanesFollowTheirLinks) {
   EXPECT_EQ(make_scenario(scene).map.lanes[1].type, LaneType::biking);
 }
 
+TEST(LaneRules, LinksOfALaneToItselfAreCountedOnce) {
+  LoggedScene scene = small_scene();
+  scene.lanes[0].entries = scene.lanes[0].exits = {1};
+  EXPECT_EQ(count_of(make_scenario(scene), "links of a lane to itself"), 1);
+}
+
 TEST(LaneRules, NeighborsAreMutualAndTheLongest) {
   LoggedScene scene = small_scene();
   scene.lanes.push_back(lane_at(2, 3.5));
