@@ -153,8 +153,8 @@ Scenario make_scenario(LoggedScene scene);
 
 /// Inverse of make_scenario(), except for data that a LoggedScene lacks: walls, parking spaces, painted stop lines,
 /// signs except stop signs, the map's own lights, SavedMotion, widths of marks, and mark colours except white and
-/// yellow. Double lines become two stripes, and broken lines become dashes. Lanes keep the ids of the file if these are
-/// unique.
+/// yellow. Double lines become two stripes, and broken lines become dashes. Lanes and tracks keep the ids of the file
+/// if these are unique.
 LoggedScene scene_of_scenario(const Scenario& scenario);
 
 }  // namespace pictura

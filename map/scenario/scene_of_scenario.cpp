@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <charconv>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <set>
 
@@ -31,6 +32,7 @@ class SceneBuilder {
 
   LoggedScene result() {
     find_lane_ids();
+    find_track_ids();
     state_tracks();
     state_lanes();
     state_paint();
@@ -62,6 +64,16 @@ class SceneBuilder {
     for (std::size_t i = 0; i < map_.lanes.size(); ++i) lane_ids_.push_back(static_cast<int64_t>(i));
   }
 
+  /// Replaces ids that repeat, because objects of interest are stated by the ids of their tracks.
+  void find_track_ids() {
+    std::set<int64_t> known;
+    for (const RecordedTrack& track : from_.tracks) {
+      known.insert(track.id);
+      track_ids_.push_back(track.id);
+    }
+    if (known.size() < track_ids_.size()) std::iota(track_ids_.begin(), track_ids_.end(), 0);
+  }
+
   std::vector<int64_t> ids_of(const std::vector<int32_t>& lanes, IndexRange range) const {
     std::vector<int64_t> ids;
     for (int32_t i = range.begin; i < range.end; ++i) ids.push_back(lane_ids_[lanes[i]]);
@@ -72,7 +84,7 @@ class SceneBuilder {
     for (std::size_t i = 0; i < from_.tracks.size(); ++i) {
       const RecordedTrack& track = from_.tracks[i];
       LoggedTrack& logged = scene_.tracks.emplace_back();
-      logged.id = track.id;
+      logged.id = track_ids_[i];
       logged.type = track.type;
       logged.control = track.control;
       const Span<const TrackState> states = from_.states_of(static_cast<int32_t>(i));
@@ -91,7 +103,7 @@ class SceneBuilder {
         state.velocity_y_mps = double{states[step].velocity_mps.y};
       }
     }
-    for (const int32_t track : from_.objects_of_interest) scene_.objects_of_interest.push_back(from_.tracks[track].id);
+    for (const int32_t track : from_.objects_of_interest) scene_.objects_of_interest.push_back(track_ids_[track]);
     for (const PredictedTrack& predicted : from_.tracks_to_predict) {
       scene_.predictions.emplace_back(predicted.track, predicted.difficulty);
     }
@@ -165,7 +177,7 @@ class SceneBuilder {
   const Scenario& from_;
   const RoadMap& map_;
   const Eigen::Vector3d origin_{map_.origin_m[0], map_.origin_m[1], map_.origin_m[2]};
-  std::vector<int64_t> lane_ids_;
+  std::vector<int64_t> lane_ids_, track_ids_;
   LoggedScene scene_;
 };
 

@@ -498,6 +498,15 @@ TEST(AuthoredScenes, ReadBackBitwiseIdenticalFarFromTheOrigin) {
   }
 }
 
+TEST(AuthoredScenes, ObjectsOfInterestStayWhereIdsRepeat) {
+  LoggedScene scene = small_scene();
+  scene.tracks.push_back(scene.tracks[0]);
+  scene.objects_of_interest = {5};
+  Scenario scenario = make_scenario(scene);
+  scenario.objects_of_interest = {1};
+  EXPECT_THAT(stated_again(scenario).objects_of_interest, ::testing::ElementsAre(1));
+}
+
 TEST(AuthoredScenes, RecordingsKeepTheirTracksLinksAndLights) {
   Scenario recorded = make_scenario(test::make_fixture());
   Scenario stated = stated_again(recorded);
