@@ -215,6 +215,8 @@ Scenario load_scenario(const SceneRef& scene, SceneReport* report_out) {
   try {
     if (const std::optional<std::string> encoded = read_cached(cached)) {
       Scenario scenario = decode_scenario(*encoded, key, cached);
+      // Maps of files without records are called as the file, of which another link may have been cached.
+      if (scene.record < 0) scenario.map.name = fs::path(scene.file).stem().string();
       report.cached = true;
       return scenario;
     }

@@ -402,6 +402,17 @@ TEST(SceneCache, ScenesAndIndicesAreKeptUntilTheirFileChanges) {
   EXPECT_EQ(load_scenario(shard + "#2").id, "fixture00000004");
 }
 
+TEST(SceneCache, ScenesAreCalledAsTheLinkThatIsRead) {
+  const test::ScratchFolder folder, cache;
+  const test::EnvironmentVariable on("PICTURA_CACHE", std::nullopt), home("XDG_CACHE_HOME", cache.path());
+  write_file(folder / "a.json", test::write_gpudrive(test::make_fixture({.num_steps = 3})));
+  std::filesystem::create_symlink(folder / "a.json", folder / "b.json");
+  SceneReport report;
+  EXPECT_EQ(load_scenario(folder / "a.json").map.name, "a");
+  EXPECT_EQ(load_scenario(folder / "b.json", &report).map.name, "b");
+  EXPECT_TRUE(report.cached);
+}
+
 TEST(SceneCache, ChangedBytesOfEqualSizeAndTimeAreDetected) {
   const test::ScratchFolder folder, cache;
   const test::EnvironmentVariable on("PICTURA_CACHE", std::nullopt), home("XDG_CACHE_HOME", cache.path());
