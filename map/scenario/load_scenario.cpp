@@ -142,6 +142,15 @@ Scenario import_scene(const SceneRef& scene, std::string_view bytes) {
   return make_scenario(womd::parse_scenario(bytes, fmt::format("{}: record {}", scene.file, scene.record)));
 }
 
+/// Returns the scenario_id of a file that is one scene, or an empty text if the file cannot be read.
+std::string id_of_file(const SceneRef& scene) {
+  try {
+    return load_scenario(scene).id;
+  } catch (const Error&) {
+    return "";  // the fault is reported when the scene is loaded
+  }
+}
+
 }  // namespace
 
 bool is_scene_name(std::string_view name) {
@@ -195,6 +204,9 @@ SceneRef find_scene(const std::string& name) {
   }
   if (const std::optional<uint64_t> number = parse_unsigned(wanted.selector)) {
     if (*number < index.scenes.size()) return index.scenes[*number];
+  }
+  for (const SceneRef& scene : index.scenes) {
+    if (scene.record < 0 && id_of_file(scene) == wanted.selector) return scene;
   }
   // The message contains the first fault, because the requested record may be in an omitted end of the file.
   fail_usage("{}: expected #0 to #{} or the id of one of its scenes, got #{}{}", wanted.path, index.scenes.size() - 1,

@@ -16,7 +16,7 @@ struct SceneRef {
   std::string file;
   int32_t record = -1;             // index in a TFRecord file; -1: the file is the scene
   uint64_t offset = 0, bytes = 0;  // payload of the record
-  std::string id;                  // scenario_id, or empty if unknown
+  std::string id;                  // scenario_id in a TFRecord file, or empty if unknown
 };
 
 struct SceneIndex {
@@ -41,8 +41,8 @@ SceneIndex index_scenes(const std::string& path);
 SceneIndex find_scenes(const std::string& name);
 
 /// Returns the scene of a name: a file or folder, optionally with #K (from 0) or #SCENARIO_ID. The default is the first
-/// scene. Throws UsageError for an invalid selector. Throws Error, which names the file, for a file that cannot be
-/// indexed.
+/// scene. Loads files other than TFRecords one after the other to find an id. Throws UsageError for an invalid
+/// selector. Throws Error, which names the file, for a file that cannot be indexed.
 SceneRef find_scene(const std::string& name);
 
 /// Loads a scene, from the cache if possible. Throws Error, which names file, record and field, for a faulty file.

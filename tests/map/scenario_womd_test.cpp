@@ -261,6 +261,12 @@ TEST(SceneNames, RecordsAreFoundByNumberAndId) {
             shard + ": expected #0 to #2 or the id of one of its scenes, got #3");
   EXPECT_EQ(message_of([&] { load_scenario(folder / "none.tfrecord"); }),
             folder / "none.tfrecord" + ": no such file or folder");
+  LoggedScene other = test::make_fixture({.num_steps = 3});
+  other.id = "other";
+  write_file(folder / "other.json", test::write_gpudrive(other));
+  write_file(folder / "faulty.json", "{}");
+  EXPECT_EQ(load_scenario(folder.path() + "#other").map.name, "other");
+  EXPECT_EQ(load_scenario(folder / "other.json#other").id, "other");
   EXPECT_TRUE(is_scene_name(shard + "#2"));
   EXPECT_TRUE(is_scene_name(folder.path() + "#2"));
   EXPECT_FALSE(is_scene_name("Town01"));
