@@ -54,6 +54,18 @@ void check_mutual(const RoadMap& map, IndexRange Lane::* range, IndexRange Lane:
   }
 }
 
+/// Checks that every lane is in a row with a leftmost lane. Neighbours are mutual, so other lanes form rings.
+void check_rows(const RoadMap& map) {
+  std::vector<char> is_in_row(map.lanes.size(), 0);
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    if (map.lanes[i].left_neighbor >= 0) continue;
+    for (int32_t k = static_cast<int32_t>(i); k >= 0; k = map.lanes[k].right_neighbor) is_in_row[k] = 1;
+  }
+  for (std::size_t i = 0; i < map.lanes.size(); ++i) {
+    PICTURA_CHECK(is_in_row[i], "lane {}: left_neighbor: expected a row of lanes that ends on the left, got a ring", i);
+  }
+}
+
 void validate_lanes(const RoadMap& map) {
   for (std::size_t i = 0; i < map.lanes.size(); ++i) {
     const Lane& lane = map.lanes[i];
@@ -90,6 +102,7 @@ void validate_lanes(const RoadMap& map) {
                    kMaxPiece_m + kPieceTolerance_m);
     }
   }
+  check_rows(map);
   check_mutual(map, &Lane::successors, &Lane::predecessors, "successors");
   check_mutual(map, &Lane::predecessors, &Lane::successors, "predecessors");
 }

@@ -28,11 +28,17 @@ TEST(RoadMap, EveryDamageIsFoundAndNamed) {
   ASSERT_FALSE(valid_map.markings.empty());
   std::size_t linked = 0;
   while (valid_map.lanes[linked].successors.size() == 0) ++linked;
+  std::size_t alone = 0;
+  while (valid_map.lanes[alone].left_neighbor >= 0 || valid_map.lanes[alone].right_neighbor >= 0) ++alone;
   const float nan = std::nanf("");
   const std::vector<std::pair<const char*, std::function<void(RoadMap*)>>> damages = {
       {"points", [](RoadMap* map) { map->lanes[0].points.end = 1 << 30; }},
       {"points", [](RoadMap* map) { map->lanes[0].points = {0, 1}; }},
       {"left_neighbor", [](RoadMap* map) { map->lanes[0].left_neighbor = static_cast<int32_t>(map->lanes.size()); }},
+      {"got a ring",
+       [&](RoadMap* map) {
+         map->lanes[alone].left_neighbor = map->lanes[alone].right_neighbor = static_cast<int32_t>(alone);
+       }},
       {"junction", [](RoadMap* map) { map->lanes[0].junction = -2; }},
       {"source_road", [](RoadMap* map) { map->lanes[0].source_road = -1; }},
       {"speed_limit_mps", [&](RoadMap* map) { map->lanes[0].speed_limit_mps = nan; }},
