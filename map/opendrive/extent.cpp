@@ -1,6 +1,8 @@
 #include "pictura/map/opendrive/extent.h"
 
 #include <cmath>
+#include <cstddef>
+#include <set>
 
 #include "pictura/map/opendrive/curves.h"
 #include "pictura/map/opendrive/read_parts.h"
@@ -25,9 +27,10 @@ void at_probes(const std::vector<double>& stations, Probe&& probe) {
   }
 }
 
-/// Checks the widths of a lane. Records the repair of negative widths once per lane.
-void check_widths(const FileRoad& road, const FileSection& section, const FileLane& lane, Faults* faults) {
-  bool is_recorded = false;
+/// Checks the widths of a lane. Records the repair of negative widths once per <lane>, though several sections may have
+/// copies of it. `recorded` has the offsets of elements whose repair is recorded.
+void check_widths(const FileRoad& road, const FileSection& section, const FileLane& lane,
+                  std::set<std::ptrdiff_t>* recorded, Faults* faults) {
   at_probes(formula_changes(road, section, lane.id, section.s, section.end), [&](double s) {
     const double ds = std::min(s, section.end - 1e-6) - section.s;
     const double width =
@@ -37,10 +40,9 @@ void check_widths(const FileRoad& road, const FileSection& section, const FileLa
     if (!(width <= kMaxWidth_m)) {
       lane.where.fail("its width at s {:.3f} is {:.3f} m; expected at most {}", s, width, kMaxWidth_m);
     }
-    if (width >= -kWidthTolerance_m || is_recorded) return;
+    if (width >= -kWidthTolerance_m || !recorded->insert(lane.where.offset).second) return;
     lane.where.record_repair(faults, RepairKind::negative_width,
                              "its width at s {:.3f} is {:.3f} m; expected at least 0", s, width);
-    is_recorded = true;
   });
 }
 
@@ -62,9 +64,10 @@ void check_position(const FileRoad& road, const FileSection& section, int border
 }  // namespace
 
 void check_extent(const FileRoad& road, Faults* faults) {
+  std::set<std::ptrdiff_t> recorded;
   for (const FileSection& section : road.sections) {
     for (const std::vector<FileLane>* side : {&section.left, &section.right}) {
-      for (const FileLane& lane : *side) check_widths(road, section, lane, faults);
+      for (const FileLane& lane : *side) check_widths(road, section, lane, &recorded, faults);
     }
     for (const int border : {static_cast<int>(section.left.size()), -static_cast<int>(section.right.size())}) {
       at_probes(formula_changes(road, section, border, section.s, section.end),

@@ -1,7 +1,9 @@
 // Builds the paint of an OpenDRIVE network: lane marks, crosswalks, stop lines and parking spaces.
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
+#include <set>
 
 #include "pictura/common/hypot.h"
 #include "pictura/map/opendrive/build.h"
@@ -77,12 +79,18 @@ std::vector<Stripe> stripes_of(const RoadMark& mark, int lane_id, double begin) 
 
 class MarkPainter {
  public:
-  MarkPainter(Build* build, std::size_t road, const FileSection& section, const FileLane& lane)
-      : build_(*build), road_index_(road), road_(build->network.roads[road]), section_(section), lane_(lane) {}
+  /// `recorded` has the offsets of marks whose repair is recorded, because several sections may have copies of a mark.
+  MarkPainter(Build* build, std::size_t road, const FileSection& section, const FileLane& lane,
+              std::set<std::ptrdiff_t>* recorded)
+      : build_(*build),
+        road_index_(road),
+        road_(build->network.roads[road]),
+        section_(section),
+        lane_(lane),
+        recorded_(*recorded) {}
 
   /// Paints the mark from `begin` to `end`.
   void paint(const RoadMark& mark, double begin, double end) {
-    is_recorded_ = false;
     const double mark_begin = section_.s + mark.s_offset;
     for (const Stripe& stripe : stripes_of(mark, lane_.id, mark_begin)) {
       if (!stripe.broken) {
@@ -135,8 +143,7 @@ class MarkPainter {
   }
 
   void note_self_crossing(const RoadMark& mark, double s) {
-    if (is_recorded_) return;
-    is_recorded_ = true;
+    if (!recorded_.insert(mark.where.offset).second) return;
     mark.where.record_repair(build_.faults, RepairKind::self_crossing_mark, "at s {:.3f} it runs against the road", s);
   }
 
@@ -159,7 +166,7 @@ class MarkPainter {
   const FileRoad& road_;
   const FileSection& section_;
   const FileLane& lane_;
-  bool is_recorded_ = false;  // whether the repair of the current mark is recorded
+  std::set<std::ptrdiff_t>& recorded_;
 };
 
 /// Returns the corners of an object: its outline, or its bounding box.
@@ -307,10 +314,11 @@ void add_object(Build* build, std::size_t road, const FileObject& object) {
 }  // namespace
 
 void build_markings(Build* build) {
+  std::set<std::ptrdiff_t> recorded;
   for (std::size_t road = 0; road < build->network.roads.size(); ++road) {
     for (const FileSection& section : build->network.roads[road].sections) {
       auto add_lane = [&](const FileLane& lane) {
-        MarkPainter painter(build, road, section, lane);
+        MarkPainter painter(build, road, section, lane, &recorded);
         for (std::size_t i = 0; i < lane.marks.size(); ++i) {
           const double begin = section.s + std::max(0.0, lane.marks[i].s_offset);
           const double end = i + 1 < lane.marks.size() ? section.s + lane.marks[i + 1].s_offset : section.end;

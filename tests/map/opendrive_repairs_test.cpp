@@ -181,6 +181,13 @@ TEST(OpenDriveRepairs, WidthsBelowZeroCountAsZero) {
   const Lane& inner = lane_named(map, "1", 0, -1);
   EXPECT_EQ(last_point(map, inner).width_m, 0);
   EXPECT_FLOAT_EQ(last_point(map, lane_named(map, "1", 0, -2)).width_m, 3);
+  // A lane beside a section of the other side continues there, but its fault is counted once.
+  RoadText road;
+  road.sections = "<laneSection s=\"0\"><left>" + lane_of(1, "driving", 3, R"(<link><successor id="1"/></link>)") +
+                  "</left><center/><right>" + lane_with(width(0, 3) + width(5, -0.5)) + "</right></laneSection>" +
+                  "<laneSection s=\"30\" singleSide=\"true\"><left>" +
+                  lane_of(1, "driving", 3, R"(<link><predecessor id="1"/></link>)") + "</left><center/></laneSection>";
+  repaired(road.text(), RepairKind::negative_width);
 }
 
 TEST(OpenDriveRepairs, MissingCoefficientsAndHeightsAreZero) {
@@ -832,6 +839,9 @@ TEST(OpenDriveRepairs, MarksThatRunBackAreCut) {
   const RoadMap map = repaired(road.text(), RepairKind::self_crossing_mark);
   EXPECT_THAT(said(map), HasSubstr("road 1: <roadMark>:"));
   ASSERT_EQ(map.markings.size(), 2u) << "before and after";
+  // Sections that end where the limit changes have copies of the mark, but its fault is counted once.
+  road.type = R"(<type s="0" type="town"><speed max="10"/></type><type s="7" type="town"><speed max="20"/></type>)";
+  EXPECT_EQ(repaired(road.text(), RepairKind::self_crossing_mark).lanes.size(), 4u);
 }
 
 // Messages about repairs.
