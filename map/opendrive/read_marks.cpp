@@ -71,7 +71,7 @@ RoadMark read_mark(const Element& element, double section_length) {
   RoadMark mark;
   mark.where = element.where();
   mark.s_offset = element.number_in("sOffset", -kMaxRoadLength_m, kMaxRoadLength_m, 0);
-  if (mark.s_offset < 0) {
+  if (mark.s_offset < -kStationTolerance_m) {
     element.record_repair(RepairKind::record_before_start, "attribute sOffset: expected a number from 0 on, got {}",
                           mark.s_offset);
   }

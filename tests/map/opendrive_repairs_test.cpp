@@ -158,6 +158,7 @@ TEST(OpenDriveRepairs, MarksBeforeTheirSectionApplyFromItsStart) {
   const RoadMap map = repaired(road_with("-2"), RepairKind::record_before_start);
   EXPECT_FALSE(map.markings.empty());
   EXPECT_FALSE(sound(road_with("0")).markings.empty());
+  EXPECT_FALSE(sound(road_with("-1e-9")).markings.empty()) << "rounded";
 }
 
 TEST(OpenDriveRepairs, WidthsBeginWithTheirSection) {
