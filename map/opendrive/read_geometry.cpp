@@ -126,6 +126,8 @@ double distance_m(const GeometryPiece& before, const GeometryPiece& piece) {
 double join_stations(const Geometry& geometry, GeometryPiece* before, GeometryPiece* piece) {
   const double end = before->s + before->length, error = piece->s - end;
   if (std::abs(error) <= kStationTolerance_m) return 0;
+  // Messages state the stations of the file, before earlier moves.
+  const double stated = geometry.piece.s, stated_end = end - (piece->s - stated);
   constexpr const char* kMessage = "attribute s: expected {}, where the previous geometry ends, got {}";
   if (piece->s > before->s) {
     GeometryPiece cut = *before;
@@ -133,12 +135,12 @@ double join_stations(const Geometry& geometry, GeometryPiece* before, GeometryPi
     measure(&cut);
     if (can_cut(error, before->length) ||
         distance_m(cut, *piece) <= distance_m(*before, *piece) + kStationTolerance_m) {
-      geometry.element.record_repair(RepairKind::geometry_station, kMessage, end, piece->s);
+      geometry.element.record_repair(RepairKind::geometry_station, kMessage, stated_end, stated);
       *before = std::move(cut);
       return 0;
     }
   }
-  geometry.element.record_repair(RepairKind::moved_geometry, kMessage, end, piece->s);
+  geometry.element.record_repair(RepairKind::moved_geometry, kMessage, stated_end, stated);
   piece->s = end;
   return -error;
 }

@@ -488,6 +488,9 @@ TEST(OpenDriveRepairs, GeometriesFollowEachOther) {
   const RoadMap moved = repaired(road.text(), RepairKind::moved_geometry);
   expect_straight(moved);
   EXPECT_THAT(said(moved), HasSubstr("attribute s: expected 50, where the previous geometry ends, got 70"));
+  road.geometry = line_at(0, 0, 0, 0, 50) + line_at(70, 50, 0, 0, 20) + line_at(110, 70, 0, 0, 30);
+  const RoadMap twice = repaired(road.text(), RepairKind::moved_geometry, 2);
+  EXPECT_THAT(twice.mends[1].message, HasSubstr("expected 90, where the previous geometry ends, got 110"));
   road.geometry = line_at(40, 0, 0, 0, 50) + line_at(90, 50, 0, 0, 50);
   expect_straight(repaired(road.text(), RepairKind::moved_geometry));
   road.geometry = line_at(50, 50, 0, 0, 50) + line_at(0, 0, 0, 0, 50);
