@@ -147,18 +147,24 @@ class Block {
   std::size_t running_ = 0;
 };
 
-/// Calls kernel() in each thread of `blocks` blocks, one block after another. `shared` is the shared memory, of any
+/// Calls kernel() in each thread of a grid of blocks, one block after another. `shared` is the shared memory, of any
 /// contents at first.
 template <std::size_t kBytes>
-void launch(int threads, unsigned blocks, uint64_t seed, unsigned char (&shared)[kBytes],
-            const std::function<void()>& kernel) {
-  grid_dim = {blocks, 1, 1};
+void launch_grid(int threads, Dim blocks, uint64_t seed, unsigned char (&shared)[kBytes],
+                 const std::function<void()>& kernel) {
+  grid_dim = blocks;
   block_dim = {static_cast<unsigned>(threads), 1, 1};
-  for (unsigned block = 0; block < blocks; ++block) {
-    block_index = {block, 0, 0};
+  for (unsigned block = 0; block < blocks.x * blocks.y * blocks.z; ++block) {
+    block_index = {block % blocks.x, block / blocks.x % blocks.y, block / blocks.x / blocks.y};
     std::memset(shared, 0xA5, kBytes);
     Block::run(threads, seed + block, kernel);
   }
+}
+/// The same for blocks in a row.
+template <std::size_t kBytes>
+void launch(int threads, unsigned blocks, uint64_t seed, unsigned char (&shared)[kBytes],
+            const std::function<void()>& kernel) {
+  launch_grid(threads, {blocks, 1, 1}, seed, shared, kernel);
 }
 
 template <typename Value>
