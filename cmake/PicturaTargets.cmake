@@ -48,7 +48,8 @@ if(PICTURA_SANITIZE)
   set(PICTURA_IS_SANITIZED 1)
   add_compile_options(-fsanitize=${PICTURA_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
     # With sanitizers, g++ 13 warns wrongly, because it does not know the length of initializer lists.
-    "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-Wno-array-bounds;-Wno-stringop-overread>")
+    "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-Wno-array-bounds;-Wno-stringop-overread>"
+    $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:Clang>>:-fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/cmake/sanitizer_ignorelist.txt>)
   add_link_options(-fsanitize=${PICTURA_SANITIZE})
 endif()
 
