@@ -16,7 +16,8 @@ if(WHAT STREQUAL WholeBuild)
   run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix})
   build(${CMAKE_CURRENT_LIST_DIR}/all_headers all_headers -DCMAKE_PREFIX_PATH=${prefix})
 else()
-  build(${SOURCE} renderer -DPICTURA_ONLY_RENDERER=ON -DPICTURA_WITH_CUDA=OFF -DPICTURA_WITH_GL=OFF
+  # Without optimization and in groups, because the build of BUILD has compiled these sources as they are shipped.
+  build(${SOURCE} renderer -DCMAKE_UNITY_BUILD=ON "-DCMAKE_CXX_FLAGS_RELEASE=-O0 -DNDEBUG" -DPICTURA_ONLY_RENDERER=ON -DPICTURA_WITH_CUDA=OFF -DPICTURA_WITH_GL=OFF
         -DCMAKE_DISABLE_FIND_PACKAGE_pugixml=ON -DPICTURA_VENV=${SCRATCH}/none)
   run(${CMAKE_COMMAND} --install ${SCRATCH}/renderer --prefix ${prefix} --component renderer)
 endif()
