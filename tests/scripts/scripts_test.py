@@ -544,6 +544,19 @@ class Setup(unittest.TestCase):
         self.write_program("bin/nvcc", "true")
         self.assertEqual(self.link(), "build/cuda/compile_commands.json")
 
+    def test_torch_can_be_left_to_the_next_call(self):
+        self.write_program("bin/python3", '[ "$1" = -m ]')  # has no torch, and makes no environment
+        self.write_program("venv/bin/pip", f"echo tools >>{self.root}/installed")
+        self.write_program("venv/bin/python", f'echo 2.11.0; [ "$2" != pip ] || echo torch >>{self.root}/installed')
+        environment = dict(os.environ, PICTURA_VENV="venv", PATH=f"{self.root}/bin:/usr/bin:/bin")
+        for options, installed in ((["--without-torch"], "tools"), (["--without-torch"], "tools"), (["--gpu"], "tools tools torch"),
+                                   (["--gpu"], "tools tools torch"), (["--gpu", "--without-torch"], "tools tools torch")):  # fmt: skip
+            with self.subTest(options=options):
+                result = subprocess.run([self.root / "scripts/setup", *options], env=environment, capture_output=True, text=True, timeout=60)
+                self.assertEqual((result.returncode, result.stderr), (0, ""), result.stdout)
+                self.assertEqual("torch 2.11.0" in result.stdout, "--without-torch" not in options)
+                self.assertEqual((self.root / "installed").read_text().split(), installed.split())
+
     def test_presets_export_them_and_git_ignores_the_link(self):
         presets = json.loads((SCRIPTS.parent / "CMakePresets.json").read_text())["configurePresets"]
         base = next(preset for preset in presets if preset["name"] == "base")
