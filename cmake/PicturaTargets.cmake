@@ -143,9 +143,9 @@ endfunction()
 # pictura_add_test(NAME SOURCES... LINK libs... [LABELS labels...] [PRECOMPILED header] [WHOLE suites...] [OPTIMIZED]):
 # adds the GoogleTest binary NAME_test, with a ctest entry for each test. PICTURA_DATA is set to ../shared/data if this
 # folder exists and the caller has not set the variable. WHOLE: suites with one entry each, because their tests share
-# expensive results. OPTIMIZED: compiles the test with optimization, for tests with much computation. The label threads
-# marks tests of code that runs on several threads: the target threaded_tests builds only these tests, and the preset
-# tsan runs only these.
+# expensive results, or take less time than a start of a program with torch (0.3 s). OPTIMIZED: compiles the test with
+# optimization, for tests with much computation. The label threads marks tests of code that runs on several threads: the
+# target threaded_tests builds only these tests, and the preset tsan runs only these.
 add_custom_target(threaded_tests)
 function(pictura_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "OPTIMIZED" "PRECOMPILED" "SOURCES;LINK;LABELS;WHOLE")
