@@ -168,6 +168,12 @@ function(pictura_add_test name)
   if(NOT arg_OPTIMIZED)
     pictura_leave_unoptimized(${name}_test)
   endif()
+  if(PICTURA_SANITIZE AND arg_LINK MATCHES "pictura::(map|simulator|make_simulator)|pictura_scene_fixture")
+    # With -O1 clang inlines few templates, and the linker takes the first of equal functions. Without this option, the
+    # importer of maps would use the unoptimized functions of the test.
+    target_link_options(${name}_test PRIVATE
+      LINKER:--whole-archive $<TARGET_FILE:pictura_map> $<TARGET_FILE:pictura_common> LINKER:--no-whole-archive)
+  endif()
   if(threads IN_LIST arg_LABELS)
     add_dependencies(threaded_tests ${name}_test)
   endif()
