@@ -65,6 +65,20 @@ std::string ParameterVisitor::current_name(const NamedOption& option, const std:
   return option.renamed.name;
 }
 
+namespace {
+
+/// Stores a value. Throws UsageError for an int that the parameter's type cannot hold, and TypeError for other types.
+void set(const Parameter& parameter, const py::object& value) {
+  try {
+    parameter.set(value);
+  } catch (const py::error_already_set& error) {
+    if (parameter.integers.empty() || !py::isinstance<py::int_>(value) || !error.matches(PyExc_TypeError)) throw;
+    fail_usage("{}: expected {}, got {}", parameter.name, parameter.integers, py::cast<std::string>(py::str(value)));
+  }
+}
+
+}  // namespace
+
 std::string signature_of(const py::cpp_function& function) {
   const auto text = py::cast<std::string>(function.attr("__doc__"));
   return text.substr(text.find('('), text.find('\n') - text.find('('));
@@ -99,8 +113,8 @@ void OptionsFunction::read(const py::args& by_place, const py::dict& by_name,
     const size_t place = std::find(required.begin(), required.end(), parameter.name) - required.begin();
     const bool is_named = by_name.contains(parameter.name), is_placed = place < by_place.size();
     if (is_named && is_placed) throw_error(fmt::format("got two values for '{}'", parameter.name));
-    if (is_named) parameter.set(by_name[parameter.name.c_str()]);
-    if (is_placed) parameter.set(by_place[place]);
+    if (is_named) set(parameter, by_name[parameter.name.c_str()]);
+    if (is_placed) set(parameter, by_place[place]);
     if (!is_named && !is_placed && place < required.size()) {
       throw_error(fmt::format("is missing the argument '{}'", parameter.name));
     }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -35,6 +36,7 @@ struct Parameter {
   std::string name;
   py::object value;      // current value
   py::cpp_function set;  // set(value) converts a Python value and stores it
+  std::string integers;  // range of an integer's C++ type, which conversions check; empty for other types
 };
 
 /// Collects options as parameters. The visited struct must outlive them.
@@ -128,8 +130,14 @@ class ParameterVisitor {
   void add(const NamedOption& option, const T& value, const Set& set) {
     const py::arg_v argument = (py::arg(option.name.c_str()) = value);
     parameters_.push_back(
-        {option.name, argument.value,
-         py::cpp_function([set](const T& given) { set(given); }, argument, py::name(function_.c_str()))});
+        {option.name,
+         argument.value,
+         py::cpp_function([set](const T& given) { set(given); }, argument, py::name(function_.c_str())),
+         {}});
+    if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool>) {
+      using Limits = std::numeric_limits<T>;
+      parameters_.back().integers = std::to_string(Limits::min()) + " to " + std::to_string(Limits::max());
+    }
   }
 
   std::string function_;

@@ -346,6 +346,7 @@ def test_errors_name_invalid_worlds(town):
         ({"conditioning": {"collision": "a"}}, r"conditioning: collision: expected a number or \(low, high\), got 'a'"),
         ({"conditioning": {3: 1}}, "conditioning: expected names, got 3"),
         ({"stream": "x"}, "stream: expected a cudaStream_t as int, or None, got 'x'"),
+        ({"seed": -1}, f"seed: expected 0 to {2**64 - 1}, got -1"),
     ):
         with pytest.raises(pictura.UsageError, match=message):
             pictura.Simulator([town], [(0, 4)], **options)
