@@ -16,9 +16,10 @@ enum class CommandKind : int32_t {
 /// obey only `recorded`.
 /// - action: the agent takes this action, in [0, kNumActions).
 /// - kinematic_state: sets reference point (fields.h), heading and speed after the step. Acceleration, jerk and
-///   steering angle become 0. The agent gets the height of the road on the level of z_m. Events are detected along the
-///   straight line to the pose. Numbers must be finite and at most kMaxCommanded_m, kMaxCommanded_rad and
-///   kMaxCommanded_mps in absolute value.
+///   steering angle become 0. The agent gets the height of the road on the level of z_m. Red lights, waypoints and
+///   collisions are detected along the straight line to the pose, collisions only as far as the map's fastest agent
+///   drives in a step; walls and road edges are tested at the pose. Numbers must be finite and at most kMaxCommanded_m,
+///   kMaxCommanded_rad and kMaxCommanded_mps in absolute value.
 /// - absent: the agent is AgentStatus::absent until the end of the episode or a command `recorded`. Its steps are not
 ///   valid for learning. It counts as inactive in episode_ends(), except on a map with a record and no
 ///   replayed tracks.

@@ -118,7 +118,7 @@ struct SimulatorParts {
   std::vector<WorldSpec> worlds;
 };
 
-/// Copy of a state in device memory; see Simulator::snapshot().
+/// Copy of a state in memory of Simulator::device(); see Simulator::snapshot().
 class StateSnapshot {
  public:
   virtual ~StateSnapshot() = default;

@@ -23,7 +23,7 @@ constexpr float kRest_mps = 0.3f;  // maximum speed at rest
 
 // COUNT is an integer, SUM a floating-point sum, TERMS such a sum for each reward term.
 #define PICTURA_TOTALS(COUNT, SUM, TERMS)                                                       \
-  COUNT(agent_steps) /* agent-steps: one per step and active agent */                           \
+  COUNT(agent_steps) /* one per step and agent for which is_counted() in rules/episode.h */     \
   COUNT(slot_steps)  /* number of slots times steps */                                          \
   COUNT(episodes)    /* number of times that a step reset a world */                            \
   PICTURA_EVENT_TOTALS(COUNT)                                                                   \
@@ -36,7 +36,7 @@ constexpr float kRest_mps = 0.3f;  // maximum speed at rest
   COUNT(finished_moved)           /* of these agents, those that moved faster than kRest_mps */ \
   SUM(finished_first_motion_s)    /* over agents that moved: time from start to motion */
 
-/// Totals of controlled agents since the simulator's construction.
+/// Totals of controlled agents since the simulator's construction or its last set_worlds().
 struct SimulatorTotals {
 #define COUNT(name, ...) int64_t name = 0;
 #define SUM(name) double name = 0;

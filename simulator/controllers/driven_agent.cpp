@@ -71,8 +71,7 @@ bool DrivenAgent::crosses_exit(const Motion& before, const Motion& after, float 
 }
 
 float DrivenAgent::to_bumper_m() const {
-  const float length_m = world_.agents.length_m[slot_];
-  return reference_to_center(world_.agents.agent_class[slot_], length_m) + 0.5f * length_m;
+  return reference_to_bumper(world_.agents.agent_class[slot_], world_.agents.length_m[slot_]);
 }
 
 }  // namespace pictura

@@ -212,8 +212,7 @@ float IdmController::place_on_path(const SimulatorArrays& input, size_t slot) {
   };
   if (on_lanes_[slot] && (begins || path.points_m.empty() || !serves())) {
     const bool walks = input.state.agent_class[slot] == AgentClass::pedestrian;
-    const float length_m = input.state.length_m[slot];
-    const float front_m = reference_to_center(input.state.agent_class[slot], length_m) + 0.5f * length_m;
+    const float front_m = reference_to_bumper(input.state.agent_class[slot], input.state.length_m[slot]);
     path = path_along_lanes(views_[world], walks ? -1 : input.state.lane[slot], here, input.state.heading_rad[slot],
                             front_m);
     s_m = 0;

@@ -17,8 +17,7 @@ PICTURA_HD inline bool is_at_route_end(const MapView& map, RoutePoint at) {
 /// Whether the middle of the front bumper crosses the exit in the direction of traffic.
 PICTURA_HD inline bool crosses(const Exit& exit, const AgentBox& before, const AgentBox& after) {
   const Vec2 from = front_bumper(before) - exit.middle_m.xy(), to = front_bumper(after) - exit.middle_m.xy();
-  const float to_bumper_m = reference_to_center(after.agent_class, after.length_m) + 0.5f * after.length_m;
-  const float bumper_z_m = after.center_m.z + exit.slope * to_bumper_m;
+  const float bumper_z_m = after.center_m.z + exit.slope * reference_to_bumper(after.agent_class, after.length_m);
   return dot(from, exit.direction) < 0.0f && dot(to, exit.direction) >= 0.0f &&
          fabsf(cross(exit.direction, to)) <= exit.half_width_m && fabsf(exit.middle_m.z - bumper_z_m) < kLevel_m;
 }

@@ -47,5 +47,9 @@ constexpr float kWheelbasePerLength = 0.6f;
 PICTURA_HD constexpr float reference_to_center(AgentClass agent_class, float length_m) {
   return agent_class == AgentClass::pedestrian ? 0.0f : 0.5f * kWheelbasePerLength * length_m;
 }
+/// Distance from the reference point forward to the front bumper.
+PICTURA_HD constexpr float reference_to_bumper(AgentClass agent_class, float length_m) {
+  return reference_to_center(agent_class, length_m) + 0.5f * length_m;
+}
 
 }  // namespace pictura

@@ -98,7 +98,7 @@ Shares shares_of(const RoadMap& map, const StaticGeometry& geometry, Span<const 
         const TrafficLight& light = map.lights[head.signal];
         for (const int32_t lane : Span<const int32_t>(map.light_lanes).subspan(light.lanes.begin, light.lanes.size())) {
           if (map.lanes[lane].in_junction) continue;
-          const float axle_to_bumper_m = reference_to_center(AgentClass::vehicle, length_m) + 0.5f * length_m;
+          const float axle_to_bumper_m = reference_to_bumper(AgentClass::vehicle, length_m);
           const auto pose = pose_before_end(map, lane, kBeforeLine_m[d] + axle_to_bumper_m);
           if (!pose) continue;
           View view = make_view(pose->position_m, pose->heading_rad);
