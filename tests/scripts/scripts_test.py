@@ -549,8 +549,8 @@ class Setup(unittest.TestCase):
         self.write_program("venv/bin/pip", f"echo tools >>{self.root}/installed")
         self.write_program("venv/bin/python", f'echo 2.11.0; [ "$2" != pip ] || echo torch >>{self.root}/installed')
         environment = dict(os.environ, PICTURA_VENV="venv", PATH=f"{self.root}/bin:/usr/bin:/bin")
-        for options, installed in ((["--without-torch"], "tools"), (["--without-torch"], "tools"), (["--gpu"], "tools tools torch"),
-                                   (["--gpu"], "tools tools torch"), (["--gpu", "--without-torch"], "tools tools torch")):  # fmt: skip
+        for options, installed in ((["--without-torch"], "tools"), (["--without-torch"], "tools"), (["--gpu"], "tools torch"),
+                                   (["--gpu"], "tools torch"), (["--gpu", "--without-torch"], "tools torch")):  # fmt: skip
             with self.subTest(options=options):
                 result = subprocess.run([self.root / "scripts/setup", *options], env=environment, capture_output=True, text=True, timeout=60)
                 self.assertEqual((result.returncode, result.stderr), (0, ""), result.stdout)
