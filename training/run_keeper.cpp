@@ -18,13 +18,14 @@ namespace fs = std::filesystem;
 RunKeeper::RunKeeper(const TrainOptions& options, Ranks* ranks, Communicator* communicator)
     : options_(options), ranks_(ranks), communicator_(communicator), folder_(options.out_folder) {
   if (!communicator->is_first()) return;
-  // Missing inputs are reported before the folder is created.
+  // A run that uses the folder is reported first, and missing inputs before a folder is created.
+  if (fs::is_directory(options.out_folder)) lock_.emplace(options.out_folder);
   for (const std::string& input :
        {options.old_run == OldRun::resume ? checkpoint_path() : "", options.init_from, options.init_trunk_from}) {
     PICTURA_CHECK(input.empty() || fs::exists(input), "{}: no such file", input);
   }
   make_output_folder(options.out_folder);
-  lock_.emplace(options.out_folder);
+  if (!lock_) lock_.emplace(options.out_folder);
   old_files_ = run_files(options.out_folder);
   PICTURA_CHECK(
       old_files_.empty() || options.old_run != OldRun::refuse,
