@@ -59,6 +59,15 @@ struct ScenarioCounts {
 #undef X
   StandingCounts standing;
 
+  void add(const ScenarioCounts& part) {
+#define X(type, name) name += part.name;
+    PICTURA_SCENARIO_COUNTS(X)
+#undef X
+#define X(type, name) standing.name += part.standing.name;
+    PICTURA_STANDING_COUNTS(X)
+#undef X
+  }
+
   /// Calls visit(name in files, count) for all counts.
   template <typename Counts, typename Visit>
   static void visit(Counts& counts, const Visit& visit) {

@@ -1,7 +1,10 @@
 #include "pictura/evaluation/robust_protocol.h"
 
 #include <algorithm>
+#include <map>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "pictura/common/error.h"
 #include "pictura/configuration/simulator_section.h"
@@ -57,9 +60,26 @@ void check(const RobustOptions& options) {
   expect(!options.light_cycles && !options.light_heads, "light_cycles, light_heads");
 }
 
-void append(const DensityResult& result, DensityResult* sum) {
-  sum->scenarios.insert(sum->scenarios.end(), result.scenarios.begin(), result.scenarios.end());
-}
+// Counts of several conditions. Conditions with equal maps and numbers of agents drive in the same worlds, whose counts
+// are added, because estimates assume that scenarios are independent.
+struct Pool {
+  DensityResult worlds;
+  std::map<std::pair<std::vector<std::string>, int>, size_t> first_world;  // of these maps and agents
+  int scenarios = 0;
+
+  void add(const RobustRow& row) {
+    const std::vector<ScenarioCounts>& counts = row.counts.scenarios;
+    if (counts.empty()) return;
+    scenarios += static_cast<int>(counts.size());
+    const auto [place, is_new] =
+        first_world.try_emplace({row.condition.maps, row.condition.agents_per_world}, worlds.scenarios.size());
+    if (is_new) {
+      worlds.scenarios.insert(worlds.scenarios.end(), counts.begin(), counts.end());
+    } else {
+      for (size_t i = 0; i < counts.size(); ++i) worlds.scenarios[place->second + i].add(counts[i]);
+    }
+  }
+};
 
 }  // namespace
 
@@ -84,12 +104,13 @@ EvaluateRow RobustReport::metrics(const RobustRow& row) const { return row_of(ro
 std::vector<std::pair<std::string, EvaluateRow>> RobustReport::pooled() const {
   std::vector<std::pair<std::string, EvaluateRow>> result;
   for (const char* const part : {"towns", "others", "cameras", "all"}) {
-    DensityResult sum;
+    Pool pool;
     for (const RobustRow& row : rows) {
       const bool is_counted = part == std::string("all") ? row.condition.part != "carla" : row.condition.part == part;
-      if (is_counted) append(row.counts, &sum);
+      if (is_counted) pool.add(row);
     }
-    if (!sum.scenarios.empty()) result.emplace_back(part, row_of(sum, setting.steps));
+    if (pool.scenarios == 0) continue;
+    result.emplace_back(part, row_of(pool.worlds, setting.steps)).second.scenarios = pool.scenarios;
   }
   return result;
 }

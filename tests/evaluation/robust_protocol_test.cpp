@@ -87,6 +87,27 @@ TEST(RobustProtocol, DrivesAControllerUnderApplicableConditions) {
   EXPECT_EQ(report.setting.steps, kRobustSteps);
 }
 
+TEST(RobustProtocol, CountsEqualWorldsOfSeveralConditionsOnce) {
+  RobustRow one{{"others", "first", {"procedural:1"}, 40, {}, 0}, {}, {}};
+  for (const int at_fault : {1, 3, 0}) {
+    ScenarioCounts& counts = one.counts.scenarios.emplace_back();
+    counts.vehicles = 10;
+    counts.at_fault = at_fault;
+  }
+  RobustReport report;
+  report.rows = {one, one};
+  const EvaluateRow pooled = report.pooled().front().second, alone = report.metrics(one);
+  EXPECT_EQ(pooled.scenarios, 6);
+  EXPECT_EQ(pooled.vehicle_episodes, 60);
+  EXPECT_EQ(pooled.at_fault_collision_rate.value, alone.at_fault_collision_rate.value);
+  EXPECT_DOUBLE_EQ(pooled.at_fault_collision_rate.half_width_95, alone.at_fault_collision_rate.half_width_95)
+      << "a second condition in the same worlds says nothing about other worlds";
+
+  report.rows[1].condition.maps = {"procedural:2"};
+  EXPECT_LT(report.pooled().front().second.at_fault_collision_rate.half_width_95,
+            alone.at_fault_collision_rate.half_width_95);
+}
+
 TEST(RobustProtocol, RefusesOptionsThatItFixes) {
   RobustOptions options = lane_keeper();
   options.seed = 2;
