@@ -18,6 +18,14 @@ constexpr int kDecelerationSteps = 20;
 constexpr std::array<double, 3> kQuantiles{0.1, 0.5, 0.9};
 constexpr std::array<const char*, 3> kQuantileNames{"reveal_s_p10", "reveal_s_p50", "reveal_s_p90"};
 
+/// Returns the quantile, in [0, 1], of sorted numbers, with linear interpolation.
+double quantile(const std::vector<double>& sorted, double share) {
+  const double at = share * static_cast<double>(sorted.size() - 1);
+  const auto below = static_cast<size_t>(at);
+  const size_t above = std::min(below + 1, sorted.size() - 1);
+  return std::lerp(sorted[below], sorted[above], at - static_cast<double>(below));
+}
+
 // Sums of a run's measures, or of the differences of two runs, by scene.
 struct MeasureSums {
   SceneMeans distance_m, corner_m, speed_mps, approach_mps, deceleration_mps2;
@@ -70,8 +78,7 @@ CornerRow runs_row(const CornerResults& results, bool walls, CornerCase its_case
   row.at_reveal = sums.means();
   std::sort(reveals_s.begin(), reveals_s.end());
   for (size_t i = 0; i < kQuantiles.size(); ++i) {
-    const auto at = static_cast<size_t>(kQuantiles[i] * static_cast<double>(reveals_s.size()));
-    row.reveal_s[i] = reveals_s.empty() ? std::nan("") : reveals_s[std::min(at, reveals_s.size() - 1)];
+    row.reveal_s[i] = reveals_s.empty() ? std::nan("") : quantile(reveals_s, kQuantiles[i]);
   }
   for (size_t k = 0; k < speeds.size(); ++k) {
     row.speed_mps[k] = speeds[k].mean();
