@@ -222,7 +222,10 @@ void InfractionObserver::after_step(const StepResult& /*result*/) {
     const WorldStep step(*simulator_, world, *before_, *after_);
     for (size_t agent = 0; agent < step.num_agents; ++agent) {
       const size_t slot = step.first_slot + agent;
-      if (before_->status[slot] != AgentStatus::active) continue;
+      if (before_->status[slot] != AgentStatus::active) {
+        lane_change_step_[slot] = 0;  // another agent may enter the slot
+        continue;
+      }
       if (step.has_changed_lane(slot)) lane_change_step_[slot] = step_;
       if (after_->status[slot] == AgentStatus::halted) found_now_.push_back(describe(step, agent));
     }

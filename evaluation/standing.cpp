@@ -56,6 +56,7 @@ void StandingObserver::after_step(const StepResult& /*result*/) {
       int32_t& awaited = awaited_light_[slot];
       if (now.agent_class[slot] != AgentClass::vehicle || now.status[slot] != AgentStatus::active) {
         awaited = -1;
+        progress_[slot] = {step_, 0};  // another agent may enter the slot
         continue;
       }
       StandingCounts& counts = counts_[driver_of_slot_[slot]][world];
