@@ -418,6 +418,7 @@ RealismReport score_rollouts(const std::string& path, const std::vector<std::str
       Outcome& outcome = outcomes[static_cast<size_t>(item)];
       // If the index knows the scene's id, a scene without rollouts need not be read.
       if (!scene.id.empty() && !file.has(scene.id)) return;
+      outcome.id = scene.id;
       try {
         auto scenario = std::make_shared<const Scenario>(load_scenario(scene));
         outcome.id = scenario->id;
