@@ -64,7 +64,7 @@ void check(const RobustOptions& options) {
 // are added, because estimates assume that scenarios are independent.
 struct Pool {
   DensityResult worlds;
-  std::map<std::pair<std::vector<std::string>, int>, size_t> first_world;  // of these maps and agents
+  std::map<std::pair<std::vector<std::string>, int>, size_t> first_world;  // by maps and agents
   int scenarios = 0;
 
   void add(const RobustRow& row) {
