@@ -48,7 +48,8 @@ Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Mi
   const at::Tensor all_log_probs = at::log_softmax(output.logits, 1);
   const at::Tensor log_prob = log_probs_of(all_log_probs, targets, chunk.rows);
   const at::Tensor log_ratio = log_prob - targets.old_log_probs.index_select(0, chunk.rows);
-  const at::Tensor ratio = log_ratio.exp();
+  // Without the policy loss, the policy may change so fast that ratios overflow, which are statistics then.
+  const at::Tensor ratio = (config.policy_coef > 0 ? log_ratio : log_ratio.clamp_max(20)).exp();
   const at::Tensor clipped = ratio.clamp(1 - config.clip_coef, 1 + config.clip_coef);
   Losses losses;
   losses.policy = -mean(at::minimum(chunk.advantages * ratio, chunk.advantages * clipped));
@@ -78,7 +79,6 @@ Losses ppo_losses(const Policy::Output& output, const Targets& targets, const Mi
                             .abs_log_ratio = mean(log_ratio.abs())});
   }
   losses.total = config.vf_coef * losses.value;
-  // Without the policy loss, the policy may change so fast that its ratios overflow.
   if (config.policy_coef > 0) losses.total = config.policy_coef * losses.policy + losses.total;
   losses.total = losses.total - config.ent_coef * losses.entropy;
   if (imitation.defined()) losses.total = losses.total + imitation;

@@ -51,10 +51,11 @@ TEST(Teacher, ImitationAloneIgnoresRatios) {
   targets.teacher_weight = at::ones({}, doubles);
   const Minibatch minibatch{at::zeros({1}, at::kLong), 1, -at::ones({1}, doubles), /*shares=*/{}};
   TrainSection train;
-  const auto loss = [&] { return ppo_losses({logits, at::zeros({1}, doubles)}, targets, minibatch, train).total; };
-  EXPECT_TRUE(std::isinf(loss().item<double>()));
+  const auto losses = [&] { return ppo_losses({logits, at::zeros({1}, doubles)}, targets, minibatch, train); };
+  EXPECT_TRUE(std::isinf(losses().total.item<double>()));
   train.policy_coef = train.ent_coef = 0;
-  loss().backward();
+  EXPECT_TRUE(losses().stats.isfinite().all().item<bool>()) << "otherwise the update would count as failed";
+  losses().total.backward();
   const at::Tensor expected = at::softmax(logits, 1) - targets.teacher_log_probs.exp();
   EXPECT_LT((logits.grad() - expected).abs().max().item<double>(), 1e-12);
 }
