@@ -21,7 +21,8 @@ void GradientDiagnosis::measure(const Minibatch& first, const Minibatches& minib
   for_each_chunk(rows, {config.forward_chunk}, [&](const Chunk& chunk) {
     const Losses losses = learner.runner->losses(first.part(chunk), loss);
     const PhaseTimer::Scope timed(learner.timer, Phase::diagnose);
-    const at::Tensor single_losses[] = {losses.policy, config.vf_coef * losses.value, config.ent_coef * losses.entropy};
+    const at::Tensor single_losses[] = {config.policy_coef * losses.policy, config.vf_coef * losses.value,
+                                        config.ent_coef * losses.entropy};
     for (int64_t i = 0; i < 3; ++i) {
       single_losses[i].backward(/*gradient=*/{}, /*retain_graph=*/true);
       sums[i].narrow(0, 0, gradient.numel()).copy_(gradient).mul_(rows.size(0));
