@@ -42,7 +42,7 @@ at::Tensor driver_of_slots(const SimulatorArrays& input) {
 
 }  // namespace
 
-Opponents::Opponents(const Config& config, Device device, Communicator* communicator) : seed_(config.run.seed) {
+Opponents::Opponents(const Config& config, Device device, Communicator* communicator) {
   for (const std::string& text : config.simulator.other_policies) {
     const std::string path = parse_share(text)->name;
     const SavedPolicy saved = parse_policy(file_of_first(path, communicator), path);
@@ -69,8 +69,8 @@ void Opponents::enter(const Simulator& simulator) {
     if (opponent->renderer) upload_maps(simulator, opponent->renderer.get());
     const bool hides_auxiliary =
         simulator.config().auxiliary_observations && !opponent->session->training_world().auxiliary_observations;
-    opponent->controller =
-        opponent->session->make_controller(opponent->renderer.get(), /*argmax=*/false, seed_, hides_auxiliary);
+    opponent->controller = opponent->session->make_controller(opponent->renderer.get(), /*argmax=*/false,
+                                                              simulator.config().seed, hides_auxiliary);
   }
 }
 

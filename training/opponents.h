@@ -35,7 +35,6 @@ class Opponents {
 
  private:
   struct Opponent;
-  const uint64_t seed_;
   std::vector<std::unique_ptr<Opponent>> opponents_;
   std::unique_ptr<DeviceCopy<Command>> commands_;
 };
