@@ -84,7 +84,8 @@ TEST(ProceduralTownLayout, StreetsLeadForwardBetweenTheirCrossings) {
     }
   }
   for (const TownOptions& options : all) {
-    for (const town::Street& street : town::Layout(options).streets()) {
+    const town::Layout layout(options);
+    for (const town::Street& street : layout.streets()) {
       double turn = 0;
       for (const opendrive::GeometryPiece& piece : street.curve) turn += std::abs(piece.length * piece.start_curvature);
       ASSERT_GE(street.length_m, 3) << describe(options);
