@@ -160,7 +160,7 @@ void launch_grid(int threads, Dim blocks, uint64_t seed, unsigned char (&shared)
     Block::run(threads, seed + block, kernel);
   }
 }
-/// The same for blocks in a row.
+/// Calls launch_grid() for blocks in a row.
 template <std::size_t kBytes>
 void launch(int threads, unsigned blocks, uint64_t seed, unsigned char (&shared)[kBytes],
             const std::function<void()>& kernel) {
