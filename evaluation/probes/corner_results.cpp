@@ -18,7 +18,7 @@ constexpr int kDecelerationSteps = 20;
 constexpr std::array<double, 3> kQuantiles{0.1, 0.5, 0.9};
 constexpr std::array<const char*, 3> kQuantileNames{"reveal_s_p10", "reveal_s_p50", "reveal_s_p90"};
 
-/// Returns the quantile, in [0, 1], of sorted numbers, with linear interpolation.
+/// Returns the quantile `share`, from 0 to 1, of sorted numbers, with linear interpolation.
 double quantile(const std::vector<double>& sorted, double share) {
   const double at = share * static_cast<double>(sorted.size() - 1);
   const auto below = static_cast<size_t>(at);
